@@ -1,0 +1,27 @@
+"""Errors of dms_core: what a user did wrong, which thing it was, and what would be right."""
+
+
+class DmsError(Exception):
+    """Base of every error that dms_core raises on purpose."""
+
+
+class ModelError(DmsError, ValueError):
+    """A declaration is wrong in itself or does not fit the others."""
+
+
+class AssemblyError(DmsError, ValueError):
+    """The declared bodies and joints admit no consistent start."""
+
+
+class InputError(DmsError, ValueError):
+    """A value given to an input, a table or an option is not usable."""
+
+
+class SimulationError(DmsError, RuntimeError):
+    """A run failed and the caller asked for an exception instead of a result code."""
+
+
+def choices(names) -> str:
+    """A readable list of what would have been right."""
+    names = sorted(names)
+    return ", ".join(names) if names else "none are declared"

@@ -1,0 +1,1 @@
+"""Bodies (paper sect. 3.1): what owns coordinates and inertia."""

@@ -1,0 +1,150 @@
+"""Rigid body in Euler parameters (paper sect. 3.1, eq. 7): q = [r (3), p (4)].
+
+Inertia terms of M vdot - f_v, with omega = 2 G(p) pdot and J about the centre of mass in body axes:
+
+    translation   m rddot
+    rotation      4 G^T J G pddot + 8 Gdot^T J G pdot          (Gdot = G(pdot); Haug 1989, 11.1 to 11.3)
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numba import njit
+from pydantic import Field, field_validator, model_validator
+
+from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
+from dms_core.model.frames import g_matrix, rotation_matrix
+from dms_core.model.rotations import euler_parameters
+
+
+@njit(cache=True)
+def _g_times(p, x):
+    """G(p) x for two 4-tuples."""
+    return (
+        -p[1] * x[0] + p[0] * x[1] + p[3] * x[2] - p[2] * x[3],
+        -p[2] * x[0] - p[3] * x[1] + p[0] * x[2] + p[1] * x[3],
+        -p[3] * x[0] + p[2] * x[1] - p[1] * x[2] + p[0] * x[3],
+    )
+
+
+@njit(cache=True)
+def _gt_times(p, w):
+    """G(p)^T w for a 4-tuple and a 3-tuple."""
+    return (
+        -p[1] * w[0] - p[2] * w[1] - p[3] * w[2],
+        p[0] * w[0] - p[3] * w[1] + p[2] * w[2],
+        p[3] * w[0] + p[0] * w[1] - p[1] * w[2],
+        -p[2] * w[0] + p[1] * w[1] + p[0] * w[2],
+    )
+
+
+@njit(cache=True)
+def _inertia_times(par, w):
+    """J w with J = [xx, yy, zz, xy, xz, yz] in par[1:7]."""
+    return (
+        par[1] * w[0] + par[4] * w[1] + par[5] * w[2],
+        par[4] * w[0] + par[2] * w[1] + par[6] * w[2],
+        par[5] * w[0] + par[6] * w[1] + par[3] * w[2],
+    )
+
+
+@njit(cache=True)
+def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
+    """M vdot - f_v of one body."""
+    m = par[0]
+    p, pd, pdd = euler_parameters(q, 0), euler_parameters(v, 0), euler_parameters(a, 0)
+    for i in range(3):
+        r[i] += m * a[i]
+    ga, gv = _inertia_times(par, _g_times(p, pdd)), _inertia_times(par, _g_times(p, pd))
+    x, y = _gt_times(p, ga), _gt_times(pd, gv)
+    for i in range(4):
+        r[3 + i] += 4.0 * x[i] + 8.0 * y[i]
+    if level > 0:
+        for i in range(3):
+            Ja[i, i] += m
+        for k in range(4):
+            e = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2), 1.0 * (k == 3))
+            # G is linear: G(e) is its derivative by component k, and G(e) x = -G(x) e.
+            mass = _gt_times(p, _inertia_times(par, _g_times(p, e)))
+            dq1, dq2 = _gt_times(e, ga), _gt_times(p, _inertia_times(par, _g_times(e, pdd)))
+            dq3 = _gt_times(pd, _inertia_times(par, _g_times(e, pd)))
+            dv1, dv2 = _gt_times(e, gv), _gt_times(pd, _inertia_times(par, _g_times(p, e)))
+            for i in range(4):
+                Ja[3 + i, 3 + k] += 4.0 * mass[i]
+                Jq[3 + i, 3 + k] += 4.0 * (dq1[i] + dq2[i]) + 8.0 * dq3[i]
+                Jv[3 + i, 3 + k] += 8.0 * (dv1[i] + dv2[i])
+
+
+class RigidBody(Body):
+    """A rigid body. Attachment points elsewhere are given in its reference frame.
+
+    The reference frame has its origin at `position` at the start; the centre of mass, at `centre_of_mass` in that
+    frame, is what the coordinates r follow.
+    """
+
+    kind: ClassVar[str] = "rigid_body"
+    kernel: ClassVar = rigid_body
+    mass: float = Field(gt=0.0, description="mass [kg]")
+    inertia: tuple[float, ...] = Field(
+        description="about the centre of mass, axes of the reference frame [kg m^2]: (xx, yy, zz) or (xx, yy, zz, xy, xz, yz)"
+    )
+    centre_of_mass: Vector = Field(default=(0.0, 0.0, 0.0), description="in the reference frame [m]")
+    position: Vector = Field(default=(0.0, 0.0, 0.0), description="origin of the reference frame at the start [m]")
+    orientation: Quaternion = Field(
+        default=(1.0, 0.0, 0.0, 0.0), description="Euler parameters at the start, scalar first [-]; normalised"
+    )
+    velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="of the reference origin at the start, ground axes [m/s]")
+    angular_velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="at the start, ground axes [rad/s]")
+
+    @field_validator("inertia")
+    @classmethod
+    def _six(cls, value):
+        if len(value) not in (3, 6):
+            raise ValueError(f"{len(value)} numbers; give 3 (xx, yy, zz) or 6 (xx, yy, zz, xy, xz, yz)")
+        return tuple(value) + (0.0,) * (6 - len(value))
+
+    @field_validator("orientation")
+    @classmethod
+    def _unit(cls, value):
+        length = float(np.linalg.norm(value))
+        if length < 1e-6:
+            raise ValueError("the Euler parameters have length 0; (1, 0, 0, 0) is no rotation")
+        return tuple(float(x) / length for x in value)
+
+    @model_validator(mode="after")
+    def _possible_inertia(self):
+        moments = np.linalg.eigvalsh(self.inertia_matrix())
+        if moments[0] <= 0.0:
+            raise ValueError(f"inertia {self.inertia}: principal moments {moments} must be positive [kg m^2]")
+        if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+            raise ValueError(
+                f"inertia {self.inertia}: the principal moments {moments[0]:.6g}, {moments[1]:.6g}, {moments[2]:.6g} "
+                "kg m^2 violate the triangle inequality: the largest must not exceed the sum of the other two"
+            )
+        return self
+
+    def inertia_matrix(self) -> np.ndarray:
+        """J about the centre of mass [kg m^2], shape (3, 3)."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Position of the centre of mass [m] and Euler parameters [-], with their rates at the start."""
+        A = rotation_matrix(self.orientation)
+        lever = A @ np.array(self.centre_of_mass)
+        omega = np.array(self.angular_velocity)
+        r = np.array(self.position) + lever
+        v = np.array(self.velocity) + np.cross(omega, lever)
+        p_rate = 0.5 * g_matrix(self.orientation).T @ (A.T @ omega)
+        start = zip("xyz", r, v, strict=True)
+        euler = zip(("p0", "p1", "p2", "p3"), self.orientation, p_rate, strict=True)
+        return tuple(Coordinate(n, float(x), float(xd)) for n, x, xd in (*start, *euler))
+
+    def place(self, system) -> Placement:
+        """One body, its mass and inertia."""
+        block = np.zeros((7, 7), bool)
+        block[3:, 3:] = True
+        diagonal = block | np.diag([True] * 3 + [False] * 4)
+        return Placement(bodies=(self.name,), numbers=(self.mass, *self.inertia), pattern=Pattern(block, block, diagonal))

@@ -1,0 +1,1 @@
+"""Constraints (paper sect. 3.2): intrabody and interbody equations phi = 0."""

@@ -1,0 +1,59 @@
+"""Revolute joint: two bodies share a point and an axis. Five rows.
+
+    r_i + A_i s_i - r_j - A_j s_j = 0                  (3)
+    (A_i f_i) . (A_j a_j) = 0,  (A_i g_i) . (A_j a_j) = 0      f_i, g_i perpendicular to a_i   (2)
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from pydantic import Field
+
+from dms_core.model.constraints.primitives import coincidence, dot1, joint_pattern
+from dms_core.model.element import GROUND, Constraint, Placement, Vector
+from dms_core.model.frames import perpendicular, unit
+from dms_core.model.rotations import vec
+
+
+@njit(cache=True)
+def revolute(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
+    """par: s_i, s_j, f_i, g_i, a_j."""
+    coincidence(0, 0, 7, vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+    dot1(3, 0, 7, vec(par, 6), vec(par, 12), 0.0, q, v, lam, level, phi, G, W, H)
+    dot1(4, 0, 7, vec(par, 9), vec(par, 12), 0.0, q, v, lam, level, phi, G, W, H)
+
+
+class Revolute(Constraint):
+    """Hinge between body_i and body_j. What is not given of body_j is taken from the declared start poses."""
+
+    kind: ClassVar[str] = "revolute"
+    kernel: ClassVar = revolute
+    body_i: str = Field(default=GROUND, description="first body, or 'ground'")
+    body_j: str = Field(description="second body")
+    point_i: Vector = Field(default=(0.0, 0.0, 0.0), description="joint centre in the frame of body_i [m]")
+    point_j: Vector | None = Field(default=None, description="joint centre in the frame of body_j [m]")
+    axis_i: Vector = Field(default=(0.0, 0.0, 1.0), description="joint axis in the frame of body_i [-]; normalised")
+    axis_j: Vector | None = Field(default=None, description="joint axis in the frame of body_j [-]; normalised")
+
+    def rows(self) -> tuple[str, ...]:
+        """Coincidence in ground axes, then the two components of tilt."""
+        return ("x", "y", "z", "tilt_f", "tilt_g")
+
+    def place(self, system) -> Placement:
+        """Both bodies; points relative to their centres of mass."""
+        axis_i = unit(self.axis_i, f"revolute '{self.name}': axis_i")
+        axis_j = (
+            system.start_direction(self.body_i, axis_i, self.body_j)
+            if self.axis_j is None
+            else unit(self.axis_j, f"revolute '{self.name}': axis_j")
+        )
+        point_j = self.point_j
+        if point_j is None:
+            point_j = system.start_point(self.body_i, self.point_i, self.body_j)
+        f = perpendicular(axis_i)
+        s_i, s_j = system.arm(self.body_i, self.point_i), system.arm(self.body_j, point_j)
+        numbers = np.concatenate([s_i, s_j, f, np.cross(axis_i, f), axis_j])
+        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("ccc11"))

@@ -1,0 +1,197 @@
+"""The contract between an element and the system: what is declared, what is placed, what a kernel computes.
+
+An element is two things in one file: a frozen declaration (its class: names, numbers, units) and a compiled
+kernel (a function of small local arrays). The system gathers the local coordinates, calls the kernel by address,
+and scatters what it wrote; the element never learns where its numbers go.
+
+Local coordinates: seven per body named in `Placement.bodies` (position of the centre of mass, Euler parameters;
+the ground and a point mass look like bodies whose missing coordinates are constant), then `Placement.coordinates`.
+All outputs are zero before a kernel is called. `level` is 0 for values, 1 for values and derivatives.
+
+Dynamic kernel (bodies, forces, ropes, muscles, controllers): rows of M vdot + phi_q^T lam - f = 0
+
+    kernel(ip, par, q, v, a, u, level, r, Jq, Jv, Ja)
+      r[i]  contribution to row i of  M vdot - f                  Jq, Jv, Ja  its derivatives by q, v, a = vdot
+
+Constraint kernel: rows of phi(q, u) = 0
+
+    kernel(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H)
+      phi[k]            the equations                              phi_t[k, 0:2]  their first and second partial time
+      G[k, j]           phi_q                                                     derivatives (inputs enter additively)
+      W[k, j]           (phi_q v)_q                                H[i, j]        (phi_q^T lam)_q
+
+Sensor kernel: y = h(q, v, vdot, lam, u)
+
+    kernel(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu)
+
+`ip` and `par` are the integers and numbers of `Placement`; `u[k]` is (value, rate, second derivative) of input k.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numba import float64, int32, int64, types
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dms_core.errors import ModelError, choices
+
+_I = types.Array(int32, 1, "C")
+_A = types.Array(float64, 1, "C")
+_B = types.Array(float64, 2, "C")
+
+DYNAMIC = types.void(_I, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B)
+CONSTRAINT = types.void(_I, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B, _B)
+SENSOR = types.void(_I, _A, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B, _B, _B)
+
+GROUND = "ground"
+
+Vector = Annotated[tuple[float, float, float], Field(description="three numbers")]
+Quaternion = tuple[float, float, float, float]
+
+
+class Coordinate(NamedTuple):
+    """One generalised coordinate that an element owns."""
+
+    name: str
+    start: float
+    """Value of q at the start (a guess where assembly may move it)."""
+    rate: float = 0.0
+    """Value of v at the start."""
+    scale: float = 1.0
+    """Nominal size of q, in its unit: the absolute tolerance is this times rtol."""
+    rate_scale: float = 1.0
+    """Nominal size of v, in its unit per second."""
+    differential_rate: bool = True
+    """True when vdot appears in the element's row (a second-order coordinate); False when the row fixes v
+    itself (a first-order state: fibre length, activation), which then is an algebraic variable."""
+
+
+class Pattern(NamedTuple):
+    """Which local derivatives can be non-zero: boolean, shapes (n, n) each."""
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+
+
+class ConstraintPattern(NamedTuple):
+    """Which local derivatives can be non-zero: G (m, n), W (m, n), H (n, n), boolean."""
+
+    G: np.ndarray
+    W: np.ndarray
+    H: np.ndarray
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where one kernel call finds its data."""
+
+    bodies: tuple[str, ...] = ()
+    coordinates: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    integers: tuple[int, ...] = ()
+    numbers: tuple[float, ...] = ()
+    pattern: Any = None
+    """Pattern or ConstraintPattern; None means everything may be non-zero."""
+    constraint: str = ""
+    """Sensors only: the constraint whose multipliers are handed in as lam."""
+    sources: tuple[str, ...] = field(default=())
+    """Composite sensors only: elements whose own kernels are evaluated first."""
+
+    @property
+    def size(self) -> int:
+        """Number of local coordinates n."""
+        return 7 * len(self.bodies) + len(self.coordinates)
+
+
+class Declaration(BaseModel):
+    """A named, frozen, validated part of a system. Wrong values raise ModelError with name, key and value."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    kind: ClassVar[str] = ""
+    name: str = Field(min_length=1, description="unique name")
+
+    def __init__(self, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise ModelError(explain(type(self), data, error)) from None
+
+
+def explain(cls: type[BaseModel], data: dict[str, Any], error: ValidationError) -> str:
+    """One sentence per mistake: which element, which key, what value, what would be right."""
+    label = getattr(cls, "kind", "") or cls.__name__
+    who = f"{label} '{data.get('name', '?')}'"
+    lines = []
+    for e in error.errors():
+        key = ".".join(str(x) for x in e["loc"]) or "declaration"
+        if e["type"] == "extra_forbidden":
+            lines.append(f"{who}: unknown key '{key}'. Allowed: {choices(cls.model_fields)}.")
+        elif e["type"] == "missing":
+            lines.append(f"{who}: '{key}' is missing.")
+        else:
+            lines.append(f"{who}: {key} = {e['input']!r}: {e['msg'].removeprefix('Value error, ')}.")
+    return "\n".join(lines)
+
+
+class DynamicElement(Declaration):
+    """Anything that writes rows of M vdot + phi_q^T lam - f = 0."""
+
+    kernel: ClassVar[Any] = None
+
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Coordinates this element owns, by local name; the system prefixes '<element>.'."""
+        return ()
+
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the system inputs that the element reads."""
+        return ()
+
+    def place(self, system) -> Placement:
+        """Bodies, coordinates, inputs and tables of the one kernel call."""
+        raise NotImplementedError
+
+    def placements(self, system) -> tuple[Placement, ...]:
+        """One entry per kernel call; most elements have one."""
+        return (self.place(system),)
+
+
+class Body(DynamicElement):
+    """A body owns coordinates and inertia."""
+
+    rigid: ClassVar[bool] = True
+
+
+class Force(DynamicElement):
+    """A force, rope, muscle, controller or differential equation."""
+
+
+class Constraint(Declaration):
+    """Equations phi(q, u) = 0."""
+
+    kernel: ClassVar[Any] = None
+
+    def rows(self) -> tuple[str, ...]:
+        """Names of the equations, in the kernel's order."""
+        raise NotImplementedError
+
+    def place(self, system) -> Placement:
+        """Bodies, coordinates, inputs and tables of the kernel call."""
+        raise NotImplementedError
+
+
+class Sensor(Declaration):
+    """Measured quantities y = h(q, v, vdot, lam, u)."""
+
+    kernel: ClassVar[Any] = None
+
+    def outputs(self) -> tuple[tuple[str, str], ...]:
+        """(name, unit) of each component; names are suffixes of the sensor's own name, '' for a scalar."""
+        raise NotImplementedError
+
+    def place(self, system) -> Placement:
+        """Bodies, coordinates, inputs and tables of the kernel call."""
+        raise NotImplementedError

@@ -1,0 +1,57 @@
+"""Rotations and poses outside compiled code: what declarations need once, with numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dms_core.errors import ModelError
+
+
+def unit(vector, what: str) -> np.ndarray:
+    """The vector divided by its length; a vector of length 0 is an error that names `what`."""
+    x = np.asarray(vector, float)
+    length = float(np.linalg.norm(x))
+    if length < 1e-12:
+        raise ModelError(f"{what} = {tuple(map(float, x))} has length 0; give a direction, for example (0, 0, 1).")
+    return x / length
+
+
+def perpendicular(axis) -> np.ndarray:
+    """A unit vector perpendicular to `axis`, chosen the same way every time."""
+    a = np.asarray(axis, float)
+    e = np.zeros(3)
+    e[int(np.argmin(np.abs(a)))] = 1.0
+    x = np.cross(a, e)
+    return x / np.linalg.norm(x)
+
+
+def rotation_matrix(p) -> np.ndarray:
+    """A(p), shape (3, 3), of Euler parameters p (scalar first), which are normalised."""
+    p0, e1, e2, e3 = np.asarray(p, float) / np.linalg.norm(p)
+    e = np.array([e1, e2, e3])
+    skew = np.array([[0.0, -e3, e2], [e3, 0.0, -e1], [-e2, e1, 0.0]])
+    return (p0 * p0 - e @ e) * np.eye(3) + 2.0 * np.outer(e, e) + 2.0 * p0 * skew
+
+
+def quaternion(axis, angle: float) -> np.ndarray:
+    """Euler parameters of a rotation by `angle` [rad] about `axis`."""
+    a = unit(axis, "rotation axis")
+    return np.concatenate([[np.cos(angle / 2.0)], np.sin(angle / 2.0) * a])
+
+
+def quaternion_product(p, s) -> np.ndarray:
+    """Euler parameters of A(p) A(s)."""
+    p0, e = p[0], np.asarray(p[1:], float)
+    s0, f = s[0], np.asarray(s[1:], float)
+    return np.concatenate([[p0 * s0 - e @ f], p0 * f + s0 * e + np.cross(e, f)])
+
+
+def conjugate(p) -> np.ndarray:
+    """Euler parameters of A(p)^T."""
+    return np.array([p[0], -p[1], -p[2], -p[3]])
+
+
+def g_matrix(p) -> np.ndarray:
+    """G(p), shape (3, 4): omega in body axes = 2 G(p) pdot, and pdot = G(p)^T omega / 2."""
+    p0, e1, e2, e3 = p
+    return np.array([[-e1, p0, e3, -e2], [-e2, -e3, p0, e1], [-e3, e2, -e1, p0]])

@@ -1,0 +1,111 @@
+"""The declared system: bodies, constraints, forces, sensors and inputs by name (paper Fig. 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from dms_core.errors import ModelError, choices
+from dms_core.model.bodies.rigid_body import RigidBody
+from dms_core.model.element import GROUND, Body, Constraint, Declaration, Force, Sensor
+from dms_core.model.frames import rotation_matrix
+from dms_core.model.signals import Input
+
+
+class System:
+    """Everything a user declares, checked for names. Bodies' unit-norm equations (eq. 9) are added by themselves.
+
+    Args:
+        name: shown in reports.
+        bodies, constraints, forces, sensors, inputs: declarations; every name is used once.
+
+    Raises:
+        ModelError: a name is used twice, or something of the wrong kind is in a list.
+    """
+
+    def __init__(
+        self,
+        name: str = "system",
+        *,
+        bodies: tuple[Body, ...] | list[Body] = (),
+        constraints: tuple[Constraint, ...] | list[Constraint] = (),
+        forces: tuple[Force, ...] | list[Force] = (),
+        sensors: tuple[Sensor, ...] | list[Sensor] = (),
+        inputs: tuple[Input, ...] | list[Input] = (),
+    ) -> None:
+        from dms_core.model.constraints.euler_norm import EulerNorm
+
+        self.name = name
+        self.bodies = self._checked("bodies", bodies, Body)
+        norms = tuple(EulerNorm(name=f"{b.name}.euler_norm", body=b.name) for b in self.bodies if b.rigid)
+        self.constraints = norms + self._checked("constraints", constraints, Constraint)
+        self.forces = self._checked("forces", forces, Force)
+        self.sensors = self._checked("sensors", sensors, Sensor)
+        self.inputs = self._checked("inputs", inputs, Input)
+        self._by_name: dict[str, Declaration] = {}
+        for element in self.everything():
+            if element.name == GROUND:
+                raise ModelError("the name 'ground' is reserved for the fixed frame; choose another name.")
+            if element.name in self._by_name:
+                first = self._by_name[element.name]
+                raise ModelError(
+                    f"the name '{element.name}' is used by a {first.kind} and by a {element.kind}; names must be unique."
+                )
+            self._by_name[element.name] = element
+
+    @staticmethod
+    def _checked(what: str, items: Any, kind: type) -> tuple:
+        for item in items:
+            if not isinstance(item, kind):
+                raise ModelError(f"{what}: {item!r} is not a {kind.__name__}.")
+        return tuple(items)
+
+    def everything(self) -> Iterator[Declaration]:
+        """All declarations, in the order bodies, constraints, forces, sensors, inputs."""
+        yield from (*self.bodies, *self.constraints, *self.forces, *self.sensors, *self.inputs)
+
+    def element(self, name: str, kind: type | None = None) -> Any:
+        """The declaration of that name; an unknown name or a wrong kind is an error that lists the right ones."""
+        found = self._by_name.get(name)
+        wanted = kind or Declaration
+        if not isinstance(found, wanted):
+            label = getattr(wanted, "__name__", "element")
+            names = [e.name for e in self.everything() if isinstance(e, wanted)]
+            problem = "does not exist" if found is None else f"is a {found.kind}"
+            raise ModelError(f"'{name}' {problem}; a {label} is wanted. Declared: {choices(names)}.")
+        return found
+
+    def body(self, name: str) -> Body | None:
+        """The body of that name, None for 'ground'; an unknown name is an error that lists the bodies."""
+        if name == GROUND:
+            return None
+        if name not in {b.name for b in self.bodies}:
+            names = [GROUND, *(b.name for b in self.bodies)]
+            raise ModelError(f"body '{name}' does not exist. Declared: {choices(names)}.")
+        return self._by_name[name]  # type: ignore[return-value]
+
+    def arm(self, body: str, point) -> np.ndarray:
+        """A point of a body's reference frame, seen from its centre of mass [m], shape (3,)."""
+        found = self.body(body)
+        centre = found.centre_of_mass if isinstance(found, RigidBody) else (0.0, 0.0, 0.0)
+        return np.asarray(point, float) - np.asarray(centre, float)
+
+    def start_pose(self, body: str) -> tuple[np.ndarray, np.ndarray]:
+        """Declared origin [m] and rotation matrix of a body's reference frame at the start."""
+        found = self.body(body)
+        if found is None:
+            return np.zeros(3), np.eye(3)
+        rotation = rotation_matrix(found.orientation) if isinstance(found, RigidBody) else np.eye(3)
+        return np.asarray(found.position, float), rotation  # type: ignore[attr-defined]
+
+    def start_point(self, body_i: str, point, body_j: str) -> np.ndarray:
+        """A point of body_i in the frame of body_j, both at their declared start poses [m]."""
+        (r_i, A_i), (r_j, A_j) = self.start_pose(body_i), self.start_pose(body_j)
+        return A_j.T @ (r_i + A_i @ np.asarray(point, float) - r_j)
+
+    def start_direction(self, body_i: str, direction, body_j: str) -> np.ndarray:
+        """A direction of body_i in the frame of body_j, both at their declared start poses."""
+        (_, A_i), (_, A_j) = self.start_pose(body_i), self.start_pose(body_j)
+        return A_j.T @ (A_i @ np.asarray(direction, float))
