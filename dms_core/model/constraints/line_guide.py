@@ -1,0 +1,50 @@
+"""Guide of two rows: a point of body_j stays on a line of body_i, and the bodies turn freely.
+
+    (A_i f) . d = 0,  (A_i g) . d = 0,   d = r_j + A_j s_j - r_i - A_i s_i,  f, g perpendicular to the line
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from pydantic import Field
+
+from dms_core.model.constraints.primitives import dot2, joint_pattern
+from dms_core.model.constraints.relative_pose import joint_arms
+from dms_core.model.element import GROUND, Constraint, Placement, Vector
+from dms_core.model.frames import perpendicular, unit
+from dms_core.model.rotations import vec
+
+
+@njit(cache=True)
+def line_guide(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
+    """par: s_i, s_j, f, g."""
+    for k in range(2):
+        dot2(k, 0, 7, vec(par, 6 + 3 * k), vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+
+
+class LineGuide(Constraint):
+    """point_j of body_j stays on the line through point_i of body_i along axis_i."""
+
+    kind: ClassVar[str] = "line_guide"
+    kernel: ClassVar = line_guide
+    body_i: str = Field(default=GROUND, description="body that carries the line, or 'ground'")
+    body_j: str = Field(description="body whose point stays on it")
+    axis_i: Vector = Field(description="direction of the line in the frame of body_i [-]; normalised")
+    point_i: Vector = Field(default=(0.0, 0.0, 0.0), description="point of the line in the frame of body_i [m]")
+    point_j: Vector | None = Field(
+        default=None, description="guided point in the frame of body_j [m]; default: where point_i starts"
+    )
+
+    def rows(self) -> tuple[str, ...]:
+        """Distances from the line along f and g [m]."""
+        return ("off_f", "off_g")
+
+    def place(self, system) -> Placement:
+        """Both bodies; points relative to their centres of mass."""
+        axis = unit(self.axis_i, f"line_guide '{self.name}': axis_i")
+        f = perpendicular(axis)
+        numbers = np.concatenate([joint_arms(system, self), f, np.cross(axis, f)])
+        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("22"))

@@ -1,0 +1,26 @@
+"""What a joint needs of two bodies' poses: given by the user, or taken from the declared start poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dms_core.errors import ModelError
+from dms_core.model.frames import rotation_matrix
+
+
+def joint_arms(system, joint) -> np.ndarray:
+    """point_i and point_j of a joint relative to the centres of mass [m], shape (6,); point_j defaults to where
+    point_i starts."""
+    point_j = joint.point_j
+    if point_j is None:
+        point_j = system.start_point(joint.body_i, joint.point_i, joint.body_j)
+    return np.concatenate([system.arm(joint.body_i, joint.point_i), system.arm(joint.body_j, point_j)])
+
+
+def relative_rotation(system, who: str, body_i: str, body_j: str, orientation) -> np.ndarray:
+    """A_i^T A_j, shape (3, 3): its rows are the axes of body_i in the frame of body_j."""
+    if orientation is None:
+        return np.column_stack([system.start_direction(body_j, axis, body_i) for axis in np.eye(3)])
+    if np.linalg.norm(orientation) < 1e-6:
+        raise ModelError(f"{who}: orientation = {orientation} has length 0; (1, 0, 0, 0) is no rotation.")
+    return rotation_matrix(orientation)

@@ -1,0 +1,66 @@
+"""Slider, or prismatic joint (paper sect. 3.2): body_j moves along an axis of body_i without turning. Five rows.
+
+    (A_i f) . d = 0,  (A_i g) . d = 0        d = r_j + A_j s_j - r_i - A_i s_i,  f, g perpendicular to the axis a   (2)
+    (A_i f) . (A_j g') = 0,  (A_i g) . (A_j a') = 0,  (A_i a) . (A_j f') = 0                                       (3)
+
+f', g', a' are the directions of body j that coincide with f, g, a.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from pydantic import Field
+
+from dms_core.model.constraints.primitives import dot1, dot2, joint_pattern
+from dms_core.model.constraints.relative_pose import joint_arms, relative_rotation
+from dms_core.model.element import GROUND, Constraint, Placement, Quaternion, Vector
+from dms_core.model.frames import perpendicular, unit
+from dms_core.model.rotations import vec
+
+
+@njit(cache=True)
+def slider(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
+    """par: s_i, s_j, f, g, a, f', g', a'."""
+    s_i, s_j = vec(par, 0), vec(par, 3)
+    for k in range(2):
+        dot2(k, 0, 7, vec(par, 6 + 3 * k), s_i, s_j, q, v, lam, level, phi, G, W, H)
+    for k in range(3):
+        b = vec(par, 15 + 3 * ((k + 1) % 3))
+        dot1(2 + k, 0, 7, vec(par, 6 + 3 * k), b, 0.0, q, v, lam, level, phi, G, W, H)
+
+
+class Slider(Constraint):
+    """Prismatic joint: point_j of body_j stays on the axis through point_i of body_i; the bodies do not turn.
+
+    What is not given of body_j is taken from the declared start poses.
+    """
+
+    kind: ClassVar[str] = "slider"
+    kernel: ClassVar = slider
+    body_i: str = Field(default=GROUND, description="body that carries the axis, or 'ground'")
+    body_j: str = Field(description="body that slides")
+    axis_i: Vector = Field(description="direction of sliding in the frame of body_i [-]; normalised")
+    point_i: Vector = Field(default=(0.0, 0.0, 0.0), description="point of the axis in the frame of body_i [m]")
+    point_j: Vector | None = Field(
+        default=None, description="point of body_j that stays on the axis, in its frame [m]; default: where point_i starts"
+    )
+    orientation: Quaternion | None = Field(
+        default=None, description="Euler parameters of body_j's axes in those of body_i, scalar first [-]; normalised"
+    )
+
+    def rows(self) -> tuple[str, ...]:
+        """Distances from the axis along f and g, then rotations about a, f, g."""
+        return ("off_f", "off_g", "turn_a", "turn_f", "turn_g")
+
+    def place(self, system) -> Placement:
+        """Both bodies; points relative to their centres of mass."""
+        who = f"slider '{self.name}'"
+        a = unit(self.axis_i, f"{who}: axis_i")
+        f = perpendicular(a)
+        frame = np.array([f, np.cross(a, f), a])
+        R = relative_rotation(system, who, self.body_i, self.body_j, self.orientation)
+        numbers = np.concatenate([joint_arms(system, self), frame.ravel(), (frame @ R).ravel()])
+        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("22111"))

@@ -1,0 +1,42 @@
+"""Spherical joint (paper eq. 10): two bodies share a point. Three rows.
+
+    r_i + A_i s_i - r_j - A_j s_j = 0
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from numba import njit
+from pydantic import Field
+
+from dms_core.model.constraints.primitives import coincidence, joint_pattern
+from dms_core.model.constraints.relative_pose import joint_arms
+from dms_core.model.element import GROUND, Constraint, Placement, Vector
+from dms_core.model.rotations import vec
+
+
+@njit(cache=True)
+def spherical(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
+    """par: s_i, s_j."""
+    coincidence(0, 0, 7, vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+
+
+class Spherical(Constraint):
+    """Ball joint between body_i and body_j; point_j is taken from the declared start poses where it is not given."""
+
+    kind: ClassVar[str] = "spherical"
+    kernel: ClassVar = spherical
+    body_i: str = Field(default=GROUND, description="first body, or 'ground'")
+    body_j: str = Field(description="second body")
+    point_i: Vector = Field(default=(0.0, 0.0, 0.0), description="joint centre in the frame of body_i [m]")
+    point_j: Vector | None = Field(default=None, description="joint centre in the frame of body_j [m]")
+
+    def rows(self) -> tuple[str, ...]:
+        """Coincidence in ground axes."""
+        return ("x", "y", "z")
+
+    def place(self, system) -> Placement:
+        """Both bodies; points relative to their centres of mass."""
+        numbers = tuple(joint_arms(system, self))
+        return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("ccc"))

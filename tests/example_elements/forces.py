@@ -1,0 +1,86 @@
+"""Examples of forces."""
+
+from __future__ import annotations
+
+from dms_core.model.element import Force
+from dms_core.model.forces import FirstOrder, Gravity, JointSpringDamper, LumpedLoad, SecondOrder, SpringDamper
+from tests.example_elements import Example
+from tests.example_elements.constraints import HINGE
+from tests.example_elements.pair import pair
+
+LOAD = {"body": "lower", "point": (0.03, -0.1, 0.05), "force": (3.0, -20.0, 5.0), "moment": (0.4, -0.6, 2.0)}
+ENDS = {"body_i": "upper", "body_j": "lower", "point_i": (0.03, -0.3, 0.05), "point_j": (0.2, 0.0, -0.1)}
+
+
+def _force(element: Force, *inputs: str) -> Example:
+    return Example(pair(constraints=[HINGE], forces=[element], inputs=inputs), element)
+
+
+def gravity() -> Example:
+    """All three bodies, gravity along no axis."""
+    return _force(Gravity(name="weight_of_all", acceleration=(1.0, -9.0, 2.0)))
+
+
+def load() -> Example:
+    """Constant, ground axes."""
+    return _force(LumpedLoad(name="load", **LOAD))
+
+
+def following_load() -> Example:
+    """Body axes, scaled by an input."""
+    return _force(LumpedLoad(name="load", axes="body", input="pull", **LOAD), "pull")
+
+
+def pure_moment() -> Example:
+    """Body axes, no force: the tighter pattern."""
+    return _force(LumpedLoad(name="load", body="lower", moment=(0.4, -0.6, 2.0), axes="body"))
+
+
+def spring() -> Example:
+    """Stiffness, damping and preload."""
+    return _force(SpringDamper(name="spring", stiffness=200.0, damping=15.0, free_length=0.2, preload=12.0, **ENDS))
+
+
+def undamped_spring() -> Example:
+    """No damping: the tighter pattern."""
+    return _force(SpringDamper(name="spring", stiffness=200.0, **ENDS))
+
+
+def joint_spring() -> Example:
+    """Stiffness and damping about the hinge."""
+    return _force(JointSpringDamper(name="spring", joint="hinge", stiffness=8.0, damping=0.7, rest_angle=0.4))
+
+
+def joint_spring_without_damping() -> Example:
+    """No damping: the tighter pattern."""
+    return _force(JointSpringDamper(name="spring", joint="hinge", stiffness=8.0))
+
+
+def lag() -> Example:
+    """Driven by an input."""
+    return _force(FirstOrder(name="lag", time_constant=0.04, gain=3.0, input="u", start=0.2), "u")
+
+
+def free_lag() -> Example:
+    """No input."""
+    return _force(FirstOrder(name="lag", time_constant=0.04))
+
+
+def oscillator() -> Example:
+    """Driven by an input."""
+    return _force(SecondOrder(name="mode", mass=2.0, damping=0.3, stiffness=50.0, gain=4.0, input="u"), "u")
+
+
+def free_oscillator() -> Example:
+    """No input."""
+    return _force(SecondOrder(name="mode", stiffness=50.0))
+
+
+EXAMPLES = {
+    "gravity": (gravity,),
+    "lumped_load": (load, following_load, pure_moment),
+    "spring_damper": (spring, undamped_spring),
+    "joint_spring_damper": (joint_spring, joint_spring_without_damping),
+    "first_order": (lag, free_lag),
+    "second_order": (oscillator, free_oscillator),
+}
