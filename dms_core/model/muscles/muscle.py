@@ -1,0 +1,265 @@
+"""Muscle with elastic tendon and contractile fibre along a path (paper sect. 3.4, eq. 14 to 20; Thelen 2003).
+
+Fibre length q_m [m] and activation a [-] are coordinates of the system:
+
+    body rows          r = sigma l_q^T                                  (f = -sigma l_q^T)
+    fibre row          F0 (a fl fv + fp) cos(alpha) - sigma = 0         (eq. 18) [N]
+    activation row     v_a - adot(a, u) = 0                             [1/s]
+
+    sigma = F0 ft(e),   e = l_T / Ls - 1,   l_T = l(q) - q_m cos(alpha),   sin(alpha) = L0 sin(alpha0) / q_m
+
+The fibre's height L0 sin(alpha0) is constant; cos(alpha) is not let below 0.1. With the force-velocity curve inverted
+in closed form the fibre row holds q_m and its rate directly, without an inner iteration.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from pydantic import Field, model_validator
+from scipy.optimize import brentq
+
+from dms_core.errors import ModelError
+from dms_core.model.element import Coordinate, Force, Pattern, Placement
+from dms_core.model.muscles.activation import MINIMUM, activation_rate, limited
+from dms_core.model.muscles.thelen_curves import (
+    ThelenCurves,
+    active_force,
+    force_velocity,
+    passive_force,
+    tendon_force,
+)
+from dms_core.model.ropes.path import (
+    PathPoint,
+    PathTable,
+    add_path_gradient,
+    add_path_hessian,
+    path_length,
+    path_pattern,
+    path_table,
+)
+
+LEAST_COSINE = 0.1
+"""Pennation is not let beyond acos(0.1), about 84 degrees."""
+PATH_NUMBERS = 14
+"""Index in `par` where the path begins; before it F0, L0, Ls, height, vmax [m/s], tau_act, tau_deact, then the seven
+numbers of the curves."""
+PATH_INTEGERS = 2
+"""Index in `ip` where the path begins: before it, 1 for activation dynamics (0 where the input is the activation), and
+the number m of body coordinates: q_m is local coordinate m, a is m + 1."""
+
+
+@njit(cache=True)
+def pennation_cosine(par, length):
+    """(cos(alpha), its slope by the fibre length [1/m])."""
+    height = par[3]
+    if length <= height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE):
+        # A fibre without height is parallel to the tendon at every length, even where Newton's method tries l <= 0.
+        return (LEAST_COSINE, 0.0) if height > 0.0 else (1.0, 0.0)
+    s = height / length
+    c = math.sqrt(1.0 - s * s)
+    return c, s * s / (length * c)
+
+
+@njit(cache=True)
+def muscle_activation(ip, q, u):
+    """(activation [-], its derivative by the input where the input is the activation)."""
+    if ip[0] > 0:
+        return q[ip[1] + 1], 0.0
+    return limited(u[0, 0])
+
+
+@njit(cache=True)
+def tendon_state(par, length, fibre):
+    """(sigma [N], dsigma/dl [N/m], dsigma/dq_m [N/m]) at the given muscle-tendon and fibre lengths."""
+    c, c_l = pennation_cosine(par, fibre)
+    ft, ft_e = tendon_force((length - fibre * c) / par[2] - 1.0, par[10], par[11])
+    by_length = par[0] * ft_e / par[2]
+    return par[0] * ft, by_length, -by_length * (c + fibre * c_l)
+
+
+@njit(cache=True)
+def fibre_state(par, fibre, rate, a):
+    """Active and passive fibre force [N]; derivatives of the active by q_m, its rate and a, of the passive by q_m."""
+    fl, fl_l = active_force(fibre / par[1], par[7])
+    fp, fp_l = passive_force(fibre / par[1], par[8], par[9])
+    fv, fv_w, fv_a = force_velocity(rate / par[4], a, par[12], par[13])
+    F0 = par[0]
+    return (
+        F0 * a * fl * fv,
+        F0 * fp,
+        F0 * a * fl_l * fv / par[1],
+        F0 * a * fl * fv_w / par[4],
+        F0 * fl * (fv + a * fv_a),
+        F0 * fp_l / par[1],
+    )
+
+
+@njit(cache=True)
+def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
+    """Tables as described at PATH_INTEGERS and PATH_NUMBERS."""
+    m = ip[1]
+    length = path_length(ip, PATH_INTEGERS, par, PATH_NUMBERS, q)
+    act, _ = muscle_activation(ip, q, u)
+    sigma, s_l, s_m = tendon_state(par, length, q[m])
+    active, passive, by_l, by_v, by_a, passive_l = fibre_state(par, q[m], v[m], act)
+    c, c_l = pennation_cosine(par, q[m])
+    add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, r)
+    if level > 0:
+        add_path_hessian(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, sigma, Jq)
+        for i in range(m):
+            for j in range(m):
+                Jq[i, j] += s_l * r[i] * r[j]
+            Jq[i, m] = s_m * r[i]
+            Jq[m, i] = -s_l * r[i]
+        Jq[m, m] = (by_l + passive_l) * c + (active + passive) * c_l - s_m
+        Jv[m, m] = by_v * c
+        if ip[0] > 0:
+            Jq[m, m + 1] = by_a * c
+    for i in range(m):
+        r[i] *= sigma
+    r[m] = (active + passive) * c - sigma
+    if ip[0] > 0:
+        rate, rate_a, _ = activation_rate(act, limited(u[0, 0])[0], par[5], par[6])
+        r[m + 1] = v[m + 1] - rate
+        if level > 0:
+            Jq[m + 1, m + 1] = -rate_a
+            Jv[m + 1, m + 1] = 1.0
+
+
+class ThelenMuscle(Force):
+    """One muscle. It owns "fibre_length" and, with activation dynamics, "activation"."""
+
+    kind: ClassVar[str] = "thelen_muscle"
+    kernel: ClassVar = thelen_muscle
+    path: tuple[PathPoint, ...] = Field(min_length=2, description="attachment and via points from origin to insertion")
+    excitation: str = Field(
+        description="name of the input: excitation [-], or the activation itself; limited to 0.01..1"
+    )
+    max_isometric_force: float = Field(gt=0.0, description="F0 [N]")
+    optimal_fibre_length: float = Field(gt=0.0, description="L0 [m]")
+    tendon_slack_length: float = Field(gt=0.0, description="Ls [m]")
+    pennation_angle: float = Field(
+        default=0.0, ge=0.0, lt=math.pi / 2, description="alpha0 at optimal fibre length [rad]"
+    )
+    max_contraction_velocity: float = Field(
+        default=10.0, gt=0.0, description="in optimal fibre lengths per second [1/s]"
+    )
+    activation_time_constant: float = Field(default=0.015, gt=0.0, description="tau_act, rising activation [s]")
+    deactivation_time_constant: float = Field(default=0.050, gt=0.0, description="tau_deact, falling activation [s]")
+    curves: ThelenCurves = Field(default=ThelenCurves(), description="shapes of the force curves")
+    activation_dynamics: bool = Field(default=True, description="False: the input is the activation, without delay")
+    start_activation: float = Field(default=MINIMUM, ge=MINIMUM, le=1.0, description="activation at the start [-]")
+    start_fibre_length: float | None = Field(
+        default=None,
+        gt=0.0,
+        description="fibre length at the start [m]; default: static equilibrium at start_activation",
+    )
+
+    @model_validator(mode="after")
+    def _pennation_possible(self):
+        if math.cos(self.pennation_angle) < LEAST_COSINE:
+            raise ValueError(
+                f"pennation_angle = {self.pennation_angle} rad; it must be below {math.acos(LEAST_COSINE):.4f} rad"
+            )
+        return self
+
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """First-order states; the fibre length is a guess that `start_states` replaces."""
+        L0, fastest = self.optimal_fibre_length, self.optimal_fibre_length * self.max_contraction_velocity
+        fibre = Coordinate(
+            "fibre_length", self.start_fibre_length or L0, scale=L0, rate_scale=fastest, differential_rate=False
+        )
+        if not self.activation_dynamics:
+            return (fibre,)
+        quickest = 1.0 / min(self.activation_time_constant, self.deactivation_time_constant)
+        return (fibre, Coordinate("activation", self.start_activation, rate_scale=quickest, differential_rate=False))
+
+    def input_names(self) -> tuple[str, ...]:
+        """The excitation."""
+        return (self.excitation,)
+
+    def place(self, system) -> Placement:
+        """Bodies that the path crosses between, then the muscle's own coordinates."""
+        table = path_table(system, self.path)
+        names = tuple(f"{self.name}.{c.name}" for c in self.coordinates())
+        return Placement(
+            bodies=table.bodies,
+            coordinates=names,
+            inputs=(self.excitation,),
+            integers=(int(self.activation_dynamics), table.size, *table.integers),
+            numbers=(*self.numbers(), *table.numbers),
+            pattern=self._pattern(table, table.size + len(names)),
+        )
+
+    def numbers(self) -> tuple[float, ...]:
+        """The kernel's table without the path."""
+        L0 = self.optimal_fibre_length
+        return (
+            self.max_isometric_force,
+            L0,
+            self.tendon_slack_length,
+            L0 * math.sin(self.pennation_angle),
+            L0 * self.max_contraction_velocity,
+            self.activation_time_constant,
+            self.deactivation_time_constant,
+            *self.curves.numbers(),
+        )
+
+    @staticmethod
+    def _pattern(table: PathTable, n: int) -> Pattern:
+        """The tension depends on the whole length, so the bodies' block is full; the rest is the muscle's own."""
+        m = table.size
+        by_q, by_v = path_pattern(table, n), np.zeros((n, n), bool)
+        by_q[: m + 1, : m + 1] = True
+        by_q[m, m:] = True
+        by_q[range(m, n), range(m, n)] = by_v[range(m, n), range(m, n)] = True
+        return Pattern(by_q, by_v, np.zeros((n, n), bool))
+
+    def tension(self, length_mt: float, fibre_length: float) -> float:
+        """Tendon force sigma [N] at the given muscle-tendon and fibre lengths [m]."""
+        return tendon_state(np.array(self.numbers()), length_mt, fibre_length)[0]
+
+    def equilibrium(self, length_mt: float, activation: float) -> float:
+        """Fibre length [m] at rest: F0 (a fl + fp) cos(alpha) = sigma.
+
+        Args:
+            length_mt: muscle-tendon length [m].
+            activation: a [-], at least 0.01.
+
+        Raises:
+            ModelError: the tendon slack length leaves no room for the fibre within `length_mt`.
+        """
+        par = np.array(self.numbers())
+        height, room = par[3], length_mt - self.tendon_slack_length
+        shortest = max(height / math.sqrt(1.0 - LEAST_COSINE**2), 1e-3 * self.optimal_fibre_length) * (1.0 + 1e-12)
+
+        def surplus(fibre: float) -> float:
+            active, passive, *_ = fibre_state(par, fibre, 0.0, activation)
+            return (active + passive) * pennation_cosine(par, fibre)[0] - tendon_state(par, length_mt, fibre)[0]
+
+        # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
+        longest = math.hypot(max(room, 0.0), height)
+        if room <= 0.0 or longest <= shortest or surplus(shortest) >= 0.0:
+            raise ModelError(
+                f"{self.kind} '{self.name}': its path is {length_mt:.6g} m long, the tendon slack length is "
+                f"{self.tendon_slack_length:.6g} m; that leaves no room for a fibre under tension. "
+                "Shorten the tendon slack length or move the path points apart."
+            )
+        return float(brentq(surplus, shortest, longest, xtol=1e-15, rtol=1e-14, maxiter=200))
+
+    def start_states(self, system, q_bodies: np.ndarray) -> tuple[float, ...]:
+        """Fibre length [m] and, where it is a coordinate, activation [-] at the assembled start.
+
+        Args:
+            system: the system.
+            q_bodies: coordinates of the bodies of `place`, in their order, shape (7 bodies,).
+        """
+        table = path_table(system, self.path)
+        q = np.ascontiguousarray(q_bodies, float)
+        length = path_length(np.array(table.integers, np.int32), 0, np.array(table.numbers), 0, q)
+        fibre = self.start_fibre_length or self.equilibrium(length, self.start_activation)
+        return (fibre, self.start_activation) if self.activation_dynamics else (fibre,)
