@@ -1,1 +1,16 @@
-"""."""
+"""Controllers and actuators inside the DAE (paper sect. 3.5)."""
+
+from dms_core.model.control.actuator import RopeActuator
+from dms_core.model.control.pid import Pid
+from dms_core.model.control.reference_filter import ReferenceFilter
+from dms_core.model.control.ziegler_nichols import CriticalGain, Gains, find_critical_gain, ziegler_nichols
+
+__all__ = [
+    "CriticalGain",
+    "Gains",
+    "Pid",
+    "ReferenceFilter",
+    "RopeActuator",
+    "find_critical_gain",
+    "ziegler_nichols",
+]

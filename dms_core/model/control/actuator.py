@@ -1,0 +1,165 @@
+"""Actuator of a rope: its tension follows a command with a first-order lag (paper sect. 3.5, eq. 26).
+
+    T v_tau + q_tau - tau_cmd = 0          q_tau the tension [N], T the time constant [s]
+
+The command is an input, or comes from a PID controller with coordinate q_c (eq. 26):
+
+    x = sign authority (ki q_c + kp v_c + kd vdot_c)
+    tau_cmd = pretension + P(x)                                              a rope cannot push
+    tau_cmd = pretension + P(x) - P(P(x) - (max_tension - pretension))       with a limit
+
+P is the positive part max(x, 0), smoothed over the width w about 0. With s = x / w + 1/2
+
+    P(x) = 0 for s <= 0,   w (s^3 - s^4 / 2) for 0 < s < 1,   x for s >= 1
+
+It is C2 and exact outside the width, and P(x) - P(-x) = x everywhere: an agonist (sign +1) and an antagonist
+(sign -1) of the same lever give together exactly the command; smoothing only adds co-contraction, 3 w / 32 at x = 0.
+
+T must be positive. With T = 0 the row would fix q_tau alone; v_tau would be nothing but the numerical derivative of
+the tension, the start would have no equation for it, and kd vdot_c would put an acceleration, which is an algebraic
+variable of the index-2 system, into the forces that cause it. A small T (1 ms) costs an L-stable method nothing, and
+is the lag that limits the gain in the Ziegler-Nichols experiment.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numba import njit
+from pydantic import Field, model_validator
+
+from dms_core.model.control.pid import Pid
+from dms_core.model.element import Coordinate, Force, Pattern, Placement
+
+
+@njit(cache=True)
+def positive_part(x, width):
+    """P(x) and its derivative P'(x)."""
+    s = x / width + 0.5
+    if s <= 0.0:
+        return 0.0, 0.0
+    if s >= 1.0:
+        return x, 1.0
+    return width * s * s * s * (1.0 - 0.5 * s), s * s * (3.0 - 2.0 * s)
+
+
+@njit(cache=True)
+def pulled_tension(x, width, limit):
+    """P(x), smoothly limited if limit > 0, and its derivative by x."""
+    y, slope = positive_part(x, width)
+    if limit > 0.0:
+        over, cut = positive_part(y - limit, width)
+        y -= over
+        slope *= 1.0 - cut
+    return y, slope
+
+
+@njit(cache=True)
+def rope_actuator(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
+    """ip: from a PID, has authority. par: T, pretension, limit (0: none), width, sign ki, sign kp, sign kd."""
+    T, pretension, limit = par[0], par[1], par[2]
+    tension = 0.0
+    if ip[0] == 0:
+        # An input is no unknown of Newton's method: it is clipped without smoothing, so that 0 means 0.
+        tension = max(u[0, 0], 0.0)
+        if limit > 0.0:
+            tension = min(tension, limit)
+    else:
+        authority = u[0, 0] if ip[1] > 0 else 1.0
+        x = authority * (par[4] * q[1] + par[5] * v[1] + par[6] * a[1])
+        tension, slope = pulled_tension(x, par[3], limit)
+        if level > 0:
+            Jq[0, 1] = -slope * authority * par[4]
+            Jv[0, 1] = -slope * authority * par[5]
+            Ja[0, 1] = -slope * authority * par[6]
+    r[0] = T * v[0] + q[0] - pretension - tension
+    if level > 0:
+        Jq[0, 0] = 1.0
+        Jv[0, 0] = T
+
+
+class RopeActuator(Force):
+    """A motor that pulls a rope: owns the coordinate 'tension' [N], which ropes read.
+
+    Give one source of the command, an input or a PID controller.
+    """
+
+    kind: ClassVar[str] = "rope_actuator"
+    kernel: ClassVar = rope_actuator
+    command: str | None = Field(default=None, description="name of the input that commands a tension [N]")
+    pid: str | None = Field(default=None, description="name of the PID controller that commands the tension")
+    sign: Literal[1, -1] = Field(
+        default=1, description="+1 pulls for a positive PID command (agonist), -1 antagonist [-]"
+    )
+    time_constant: float = Field(gt=0.0, description="T of the first-order lag [s]")
+    pretension: float = Field(default=0.0, ge=0.0, description="tension without a command [N]")
+    max_tension: float | None = Field(default=None, gt=0.0, description="largest commanded tension [N]; None: no limit")
+    width: float = Field(default=1.0, gt=0.0, description="width w over which the positive part is smoothed [N]")
+    authority: str | None = Field(
+        default=None, description="name of the input, 0 to 1, that scales the PID command [-]"
+    )
+    start_tension: float | None = Field(
+        default=None, ge=0.0, description="tension at the start [N]; None: that of the command without any error"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self):
+        if (self.command is None) == (self.pid is None):
+            raise ValueError("give either 'command' (an input) or 'pid' (a controller), not both or neither")
+        if self.command is not None and (self.authority is not None or self.sign != 1):
+            raise ValueError("'authority' and 'sign' shape a PID command; an input commands the tension itself")
+        if self.max_tension is not None and self.max_tension - self.pretension < self.width:
+            raise ValueError(
+                f"max_tension = {self.max_tension} N must exceed pretension = {self.pretension} N by at least the "
+                f"width = {self.width} N of the smoothing"
+            )
+        return self
+
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The tension, a first-order state; sizes are a newton and a newton in T."""
+        start = self.pretension if self.start_tension is None else self.start_tension
+        return (Coordinate("tension", start, rate_scale=1.0 / self.time_constant, differential_rate=False),)
+
+    def input_names(self) -> tuple[str, ...]:
+        """The command or the authority."""
+        return tuple(name for name in (self.command, self.authority) if name is not None)
+
+    def place(self, system) -> Placement:
+        """The tension, and the PID's coordinate with its gains."""
+        limit = 0.0 if self.max_tension is None else self.max_tension - self.pretension
+        own = f"{self.name}.tension"
+        common = (self.time_constant, self.pretension, limit, self.width)
+        flags = (int(self.pid is not None), int(self.authority is not None))
+        if self.pid is None:
+            one = np.ones((1, 1), bool)
+            pattern = Pattern(one, one, ~one)
+            return Placement((), (own,), self.input_names(), flags, (*common, 0.0, 0.0, 0.0), pattern)
+        gains = system.element(self.pid, Pid)
+        row = np.array([[True, True], [False, False]])
+        pattern = Pattern(row, row, np.array([[False, gains.kd > 0.0], [False, False]]))
+        return Placement(
+            coordinates=(own, f"{self.pid}.error_integral"),
+            inputs=self.input_names(),
+            integers=flags,
+            numbers=(*common, self.sign * gains.ki, self.sign * gains.kp, self.sign * gains.kd),
+            pattern=pattern,
+        )
+
+    def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
+        """Start of each owned coordinate: the tension, without change.
+
+        Args:
+            system: the declared system.
+            q: local coordinates of the placement at the assembled start, shape (n,).
+            u: (value, rate, second derivative) of each local input at the start, shape (k, 3).
+
+        Returns:
+            One pair (q, v) [N, N/s]; v is a guess, since the row itself fixes the rate.
+        """
+        if self.start_tension is not None:
+            return ((self.start_tension, 0.0),)
+        if self.command is None:
+            return ((self.pretension + positive_part(0.0, self.width)[0], 0.0),)
+        tension = self.pretension + max(float(u[0, 0]), 0.0)
+        return ((tension if self.max_tension is None else min(tension, self.max_tension), 0.0),)

@@ -1,0 +1,105 @@
+"""Examples of controllers and actuators."""
+
+from __future__ import annotations
+
+from dms_core.model.bodies.rigid_body import RigidBody
+from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.control.actuator import RopeActuator
+from dms_core.model.control.pid import Pid
+from dms_core.model.control.reference_filter import ReferenceFilter
+from dms_core.model.element import GROUND
+from dms_core.model.frames import quaternion
+from dms_core.model.signals import Input
+from dms_core.model.system import System
+from tests.example_elements import Example
+
+INPUTS = ("psi", "wish", "pull", "authority")
+
+
+def controlled(*forces, sensors=(), body_i: str = "upper") -> System:
+    """A hinge with an axis that is none of the coordinate axes, far from angle pi, and controllers around it."""
+    upper = RigidBody(
+        name="upper", mass=1.0, inertia=(0.02, 0.03, 0.025), orientation=tuple(quaternion((1, 2, 3), 0.7))
+    )
+    lower = RigidBody(
+        name="lower",
+        mass=1.0,
+        inertia=(0.02, 0.03, 0.025),
+        centre_of_mass=(0.1, -0.2, 0.05),
+        orientation=tuple(quaternion((1, 2, 2), 0.4)),
+    )
+    hinge = Revolute(name="hinge", body_i=body_i, body_j="lower", axis_i=(0.3, -0.2, 0.9))
+    inputs = [Input(name=name) for name in INPUTS]
+    return System(bodies=[upper, lower], constraints=[hinge], forces=forces, sensors=sensors, inputs=inputs)
+
+
+def _filter() -> ReferenceFilter:
+    return ReferenceFilter(name="filter", input="wish", frequency=7.0, damping=0.8)
+
+
+def _pid(**changes) -> Pid:
+    return Pid(**{"name": "pid", "joint": "hinge", "reference": "psi", "kp": 40.0, "ki": 15.0, "kd": 3.0, **changes})
+
+
+def pid_plain() -> Example:
+    """As in the paper: an input as reference, no feedback of the drift."""
+    pid = _pid()
+    return Example(controlled(pid), pid)
+
+
+def pid_filtered() -> Example:
+    """A filter instead of an input, feedback of the drift, the joint on the ground."""
+    pid = _pid(reference=None, offset="filter.setpoint", drift_gain=2.5)
+    return Example(controlled(_filter(), pid, body_i=GROUND), pid)
+
+
+def pid_both() -> Example:
+    """Input and filter together, own pointers."""
+    pid = _pid(offset="filter.setpoint", drift_gain=2.5, pointer_i=(1.0, 0.0, 0.2), pointer_j=(1.0, 0.3, 0.1))
+    return Example(controlled(_filter(), pid), pid)
+
+
+def reference_filter() -> Example:
+    """Off resonance and underdamped."""
+    element = _filter()
+    return Example(controlled(element), element)
+
+
+def actuator_input() -> Example:
+    """An input within the limits."""
+    motor = RopeActuator(name="motor", command="pull", time_constant=0.03, pretension=4.0, max_tension=100.0)
+    return Example(controlled(motor), motor, u={"pull": (5.0, 90.0)})
+
+
+def _actuator_pid(error: tuple[float, float], **changes) -> Example:
+    motor = RopeActuator(**{"name": "motor", "pid": "pid", "time_constant": 0.03, **changes})
+    small = (-0.1, 0.1)
+    return Example(
+        controlled(_pid(), motor),
+        motor,
+        q={"pid.error_integral": small},
+        v={"pid.error_integral": error},
+        u={"authority": (0.3, 1.0)},
+    )
+
+
+def actuator_linear() -> Example:
+    """Agonist far above the smoothing."""
+    return _actuator_pid((1.0, 3.0), width=0.5, pretension=2.0)
+
+
+def actuator_blend() -> Example:
+    """Antagonist inside the smoothing, with a limit that is far away."""
+    return _actuator_pid((-1.0, 1.0), sign=-1, width=200.0, max_tension=500.0, authority="authority")
+
+
+def actuator_limit() -> Example:
+    """Inside the smoothing of the limit."""
+    return _actuator_pid((1.5, 3.0), width=80.0, max_tension=90.0)
+
+
+EXAMPLES = {
+    "pid": (pid_plain, pid_filtered, pid_both),
+    "reference_filter": (reference_filter,),
+    "rope_actuator": (actuator_input, actuator_linear, actuator_blend, actuator_limit),
+}
