@@ -49,7 +49,8 @@ def _concrete() -> dict[str, type]:
         pending += children
         if cls.kind or not children:
             assert cls.kind, f"{cls.__name__} has no kind of its own"
-            assert found.setdefault(cls.kind, cls) is cls, f"two classes are of kind '{cls.kind}': {found[cls.kind]}, {cls}"
+            first = found.setdefault(cls.kind, cls)
+            assert first is cls, f"two classes are of kind '{cls.kind}': {first}, {cls}"
     return found
 
 
@@ -164,7 +165,7 @@ class TestKernel:
 def _spoiled(call: KernelCall, output: int) -> KernelCall:
     """The same kernel with its largest entry of one output wrong by 1e-5 of itself."""
 
-    def kernel(*arguments):
+    def kernel(*arguments: object) -> None:
         call.kernel(*arguments)
         out = arguments[len(arguments) - call.outputs + output]
         worst = np.unravel_index(np.argmax(np.abs(out)), out.shape)
@@ -175,7 +176,14 @@ def _spoiled(call: KernelCall, output: int) -> KernelCall:
 
 @pytest.mark.parametrize(
     ("kind", "output"),
-    [("rigid_body", 1), ("rigid_body", 2), ("rigid_body", 3), ("angle_driver", 1), ("angle_driver", 3), ("angle_driver", 4)],
+    [
+        ("rigid_body", 1),
+        ("rigid_body", 2),
+        ("rigid_body", 3),
+        ("angle_driver", 1),
+        ("angle_driver", 3),
+        ("angle_driver", 4),
+    ],
 )
 def test_a_wrong_derivative_is_found(kind, output):
     call = kernel_calls(examples()[kind][0]())[0]

@@ -85,7 +85,9 @@ def angle() -> Example:
 
 def position() -> Example:
     """A point along a tilted direction."""
-    return _joint(PositionDriver(name="drive", axis_i=(1.0, 0.5, -0.3), point_j=(0.1, 0.2, 0.0), input="x", **PAIR), "x")
+    return _joint(
+        PositionDriver(name="drive", axis_i=(1.0, 0.5, -0.3), point_j=(0.1, 0.2, 0.0), input="x", **PAIR), "x"
+    )
 
 
 EXAMPLES = {

@@ -113,7 +113,15 @@ def kernel_calls(example: Example) -> list[KernelCall]:
     branch = next(b for b in (DynamicElement, Constraint, Sensor) if isinstance(element, b))
     placements = element.placements(system) if branch is DynamicElement else (element.place(system),)
     return [
-        KernelCall(branch, type(element).kernel, p, example, _rows(element), _multipliers(element, system, p), *_scales(example, p))
+        KernelCall(
+            branch,
+            type(element).kernel,
+            p,
+            example,
+            _rows(element),
+            _multipliers(element, system, p),
+            *_scales(example, p),
+        )
         for p in placements
     ]
 

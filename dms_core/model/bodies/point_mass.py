@@ -37,4 +37,6 @@ class PointMass(Body):
     def place(self, system) -> Placement:
         """One body, its mass."""
         none = np.zeros((7, 7), bool)
-        return Placement(bodies=(self.name,), numbers=(self.mass,), pattern=Pattern(none, none, np.diag(np.arange(7) < 3)))
+        return Placement(
+            bodies=(self.name,), numbers=(self.mass,), pattern=Pattern(none, none, np.diag(np.arange(7) < 3))
+        )

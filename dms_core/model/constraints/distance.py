@@ -63,7 +63,9 @@ class Distance(Constraint):
             start = system.start_point(self.body_i, self.point_i, self.body_j)
             length = float(np.linalg.norm(start - np.asarray(self.point_j)))
         if length < 1e-9:
-            raise ModelError(f"distance '{self.name}': the ends start at one point; use a spherical joint for length 0.")
+            raise ModelError(
+                f"distance '{self.name}': the ends start at one point; use a spherical joint for length 0."
+            )
         s_i, s_j = system.arm(self.body_i, self.point_i), system.arm(self.body_j, self.point_j)
         row, H = separation_pattern(s_i, s_j)
         pattern = ConstraintPattern(row[None, :], row[None, :], H)

@@ -1,6 +1,8 @@
 """Guide of two rows: a point of body_j stays on a line of body_i, and the bodies turn freely.
 
     (A_i f) . d = 0,  (A_i g) . d = 0,   d = r_j + A_j s_j - r_i - A_i s_i,  f, g perpendicular to the line
+
+Its multipliers are the forces along f and g [N]: lam (f, g) acts on body_i, -lam (f, g) on body_j.
 """
 
 from __future__ import annotations

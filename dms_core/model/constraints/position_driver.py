@@ -1,6 +1,8 @@
 """Rheonomic constraint on a position: a point of body_j moves along a direction of body_i as an input says. One row.
 
     (A_i a) . (r_j + A_j s_j - r_i - A_i s_i) - u(t) = 0,   phi_t = -udot,   phi_tt = -uddot
+
+Its multiplier is the drive's force along a [N]: lam a acts on body_i, -lam a on body_j.
 """
 
 from __future__ import annotations

@@ -45,7 +45,8 @@ class Slider(Constraint):
     axis_i: Vector = Field(description="direction of sliding in the frame of body_i [-]; normalised")
     point_i: Vector = Field(default=(0.0, 0.0, 0.0), description="point of the axis in the frame of body_i [m]")
     point_j: Vector | None = Field(
-        default=None, description="point of body_j that stays on the axis, in its frame [m]; default: where point_i starts"
+        default=None,
+        description="point of body_j that stays on the axis, in its frame [m]; default: where point_i starts",
     )
     orientation: Quaternion | None = Field(
         default=None, description="Euler parameters of body_j's axes in those of body_i, scalar first [-]; normalised"

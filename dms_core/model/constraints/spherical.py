@@ -1,6 +1,8 @@
 """Spherical joint (paper eq. 10): two bodies share a point. Three rows.
 
     r_i + A_i s_i - r_j - A_j s_j = 0
+
+Its multipliers are the joint force in ground axes [N]: -lam acts on body_i, lam on body_j.
 """
 
 from __future__ import annotations

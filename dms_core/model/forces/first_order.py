@@ -1,6 +1,8 @@
 """First-order differential equation with a coordinate of its own: a lag between an input and its effect.
 
     T xdot + x - g u = 0
+
+The row fixes xdot itself, so that x is a first-order state.
 """
 
 from __future__ import annotations

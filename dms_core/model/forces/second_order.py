@@ -1,6 +1,8 @@
 """Second-order differential equation with a coordinate of its own: oscillator, filter, actuator.
 
     m xddot + c xdot + k x - g u = 0
+
+With stiffness and damping 0 it integrates g u twice.
 """
 
 from __future__ import annotations
