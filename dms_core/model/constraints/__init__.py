@@ -8,6 +8,7 @@ from dms_core.model.constraints.line_guide import LineGuide
 from dms_core.model.constraints.plane_guide import PlaneGuide
 from dms_core.model.constraints.position_driver import PositionDriver
 from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.constraints.slider import Slider
 from dms_core.model.constraints.spherical import Spherical
 
@@ -20,6 +21,7 @@ __all__ = [
     "PlaneGuide",
     "PositionDriver",
     "Revolute",
+    "RopeLength",
     "Slider",
     "Spherical",
 ]
