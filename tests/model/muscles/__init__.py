@@ -1,0 +1,1 @@
+"""Tests of dms_core.model.muscles."""
