@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.frames import quaternion, rotation_matrix
+from dms_core.model.frames import quaternion, unit
 from dms_core.model.muscles.muscle import ThelenMuscle
 from dms_core.model.signals import Input
 from dms_core.model.system import System
@@ -53,8 +53,8 @@ def arm(flexion_deg: float, *forces, speed: float = 0.0) -> System:
     torso = np.array(joints["offset"]["point_i"])
     humerus = torso + joints["r_shoulder"]["point_i"]
     forearm = humerus + joints["r_elbow"]["point_i"]
-    turn = quaternion(joints["r_elbow"]["axis_i"], math.radians(flexion_deg))
-    omega = speed * rotation_matrix(turn) @ joints["r_elbow"]["axis_i"]
+    axis = unit(joints["r_elbow"]["axis_i"], "axis of the elbow")
+    turn = quaternion(axis, math.radians(flexion_deg))
     return System(
         # The torso is massless in the file; a body of no importance stands in for it.
         bodies=[
@@ -65,7 +65,7 @@ def arm(flexion_deg: float, *forces, speed: float = 0.0) -> System:
                 **bodies["r_ulna_radius_hand"],
                 position=tuple(forearm),
                 orientation=tuple(turn),
-                angular_velocity=tuple(omega),
+                angular_velocity=tuple(speed * axis),
             ),
         ],
         forces=forces,

@@ -3,13 +3,17 @@
 from dms_core.model.sensors.angle import JointAngle
 from dms_core.model.sensors.coordinate import CoordinateSensor
 from dms_core.model.sensors.imu import Imu
+from dms_core.model.sensors.muscle import MuscleSensor
 from dms_core.model.sensors.point import Point
+from dms_core.model.sensors.rope import RopeSensor
 from dms_core.model.sensors.tracking import Tracking
 
 __all__ = [
     "CoordinateSensor",
     "Imu",
     "JointAngle",
+    "MuscleSensor",
     "Point",
+    "RopeSensor",
     "Tracking",
 ]
