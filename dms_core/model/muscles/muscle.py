@@ -152,7 +152,12 @@ class ThelenMuscle(Force):
     deactivation_time_constant: float = Field(default=0.050, gt=0.0, description="tau_deact, falling activation [s]")
     curves: ThelenCurves = Field(default=ThelenCurves(), description="shapes of the force curves")
     activation_dynamics: bool = Field(default=True, description="False: the input is the activation, without delay")
-    start_activation: float = Field(default=MINIMUM, ge=MINIMUM, le=1.0, description="activation at the start [-]")
+    start_activation: float = Field(
+        default=MINIMUM,
+        ge=MINIMUM,
+        le=1.0,
+        description="activation at the start [-]; without dynamics the input counts",
+    )
     start_fibre_length: float | None = Field(
         default=None,
         gt=0.0,
@@ -251,15 +256,27 @@ class ThelenMuscle(Force):
             )
         return float(brentq(surplus, shortest, longest, xtol=1e-15, rtol=1e-14, maxiter=200))
 
-    def start_states(self, system, q_bodies: np.ndarray) -> tuple[float, ...]:
-        """Fibre length [m] and, where it is a coordinate, activation [-] at the assembled start.
+    def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
+        """Start of the owned coordinates: fibre in equilibrium at rest, activation with its rate.
 
         Args:
-            system: the system.
-            q_bodies: coordinates of the bodies of `place`, in their order, shape (7 bodies,).
+            system: the declared system.
+            q: local coordinates of the placement at the assembled start, shape (n,); only those of bodies are read.
+            u: (value, rate, second derivative) of the excitation at the start, shape (1, 3).
+
+        Returns:
+            Pairs (q_m [m], its rate [m/s]) and, where it is a coordinate, (a [-], adot [1/s]). The fibre's rate is
+            that of rest; with a given start_fibre_length the fibre row itself fixes it.
+
+        Raises:
+            ModelError: the path leaves no room for the fibre (see equilibrium).
         """
         table = path_table(system, self.path)
-        q = np.ascontiguousarray(q_bodies, float)
-        length = path_length(np.array(table.integers, np.int32), 0, np.array(table.numbers), 0, q)
-        fibre = self.start_fibre_length or self.equilibrium(length, self.start_activation)
-        return (fibre, self.start_activation) if self.activation_dynamics else (fibre,)
+        length = path_length(np.array(table.integers, np.int32), 0, np.array(table.numbers), 0, np.asarray(q, float))
+        excitation = limited(float(u[0, 0]))[0]
+        a = self.start_activation if self.activation_dynamics else excitation
+        fibre = (self.start_fibre_length or self.equilibrium(length, a), 0.0)
+        if not self.activation_dynamics:
+            return (fibre,)
+        tau = self.activation_time_constant, self.deactivation_time_constant
+        return (fibre, (a, activation_rate(a, excitation, *tau)[0]))

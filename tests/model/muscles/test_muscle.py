@@ -11,6 +11,7 @@ from tests.arm26 import MUSCLES, arm, body_coordinates, muscle, table
 
 FORCE, LENGTH = 1e-3, 1e-8
 """The reference's own tolerances for static equilibrium [N], [m]."""
+STILL = np.zeros((1, 3))
 
 
 @pytest.mark.parametrize("row", table("muscle_equilibrium"), ids=lambda r: f"{r['muscle']}-{r['activation']}")
@@ -29,8 +30,9 @@ def _isometric(name: str, flexion_deg: float, activation: float) -> tuple[float,
     system = arm(flexion_deg, m)
     placement = m.place(system)
     q_bodies, _ = body_coordinates(system, placement.bodies)
-    fibre, start_activation = m.start_states(system, q_bodies)
-    assert start_activation == activation
+    (fibre, fibre_rate), (start_activation, rate) = m.start_states(system, q_bodies, np.array([[0.8, 0.0, 0.0]]))
+    assert (fibre_rate, start_activation) == (0.0, activation)
+    assert np.sign(rate) == np.sign(0.8 - activation)
     r, q = np.zeros(placement.size), np.concatenate([q_bodies, [fibre, activation]])
     _kernel(placement, q, np.zeros_like(q), activation, r)
     # At rest the fibre row balances: 1e-9 is brentq's rounding times the fibre's stiffness of up to 1e6 N/m.
@@ -99,13 +101,20 @@ def test_path_without_moving_bodies_has_only_its_own_coordinates():
     m = _between_ground_points(start_activation=0.05)
     placement = m.place(arm(0.0))
     assert placement.bodies == () and placement.coordinates == ("BIClong.fibre_length", "BIClong.activation")
-    fibre, _ = m.start_states(arm(0.0), np.zeros(0))
+    (fibre, _), _ = m.start_states(arm(0.0), np.zeros(2), STILL)
     assert fibre == pytest.approx(table("isometric_activation_step_BIClong")[0]["fibre_length_m"], abs=LENGTH)
 
 
 def test_given_start_fibre_length_is_kept():
     m = _between_ground_points(start_fibre_length=0.12)
-    assert m.start_states(arm(0.0), np.zeros(0)) == (0.12, 0.01)
+    # Excitation below its minimum: activation 0.01 rests.
+    assert m.start_states(arm(0.0), np.zeros(2), STILL) == ((0.12, 0.0), (0.01, 0.0))
+
+
+def test_without_activation_dynamics_the_input_sets_the_start():
+    m = _between_ground_points(activation_dynamics=False)
+    ((fibre, _),) = m.start_states(arm(0.0), np.zeros(1), np.array([[0.05, 0.0, 0.0]]))
+    assert fibre == pytest.approx(table("isometric_activation_step_BIClong")[0]["fibre_length_m"], abs=LENGTH)
 
 
 @pytest.mark.parametrize("length", [0.05, 0.2, 0.2723])
