@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 from pydantic import Field, model_validator
 
+from dms_core.errors import ModelError
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
 from dms_core.model.joint_angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
 from dms_core.model.rotations import vec
@@ -96,6 +97,8 @@ class Pid(Force):
         """Both bodies of the joint, q_c, and the filter's setpoint."""
         who = f"{self.kind} '{self.name}'"
         bodies, frame = sensed_angle(system, who, self.joint, self.pointer_i, self.pointer_j)
+        if self.offset is not None:
+            self._check_order(system)
         own = f"{self.name}.error_integral"
         return Placement(
             bodies=bodies,
@@ -105,6 +108,16 @@ class Pid(Force):
             numbers=(*frame, self.drift_gain),
             pattern=_pattern(self.offset is not None, self.drift_gain > 0.0),
         )
+
+    def _check_order(self, system) -> None:
+        """Start states are set in the order of declaration, and e(0) needs that of the filter."""
+        owner = self.offset.rpartition(".")[0]
+        names = [force.name for force in system.forces]
+        if owner in names[names.index(self.name) :]:
+            raise ModelError(
+                f"{self.kind} '{self.name}': offset = '{self.offset}': '{owner}' is declared behind the controller, "
+                f"whose start depends on it; declare '{owner}' first."
+            )
 
     def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
         """Start of each owned coordinate: q_c = 0, v_c = e(0).

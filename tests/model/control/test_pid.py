@@ -27,7 +27,7 @@ def _system(pid: Pid) -> System:
     return System(
         bodies=[RigidBody(name="arm", mass=1.0, inertia=(0.1, 0.1, 0.1))],
         constraints=[Revolute(name="hinge", body_j="arm", axis_i=AXIS)],
-        forces=[pid, ReferenceFilter(name="filter", input="psi", frequency=5.0)],
+        forces=[ReferenceFilter(name="filter", input="psi", frequency=5.0), pid],
         inputs=[Input(name="psi")],
     )
 
@@ -90,6 +90,15 @@ def test_nothing_to_follow_is_refused() -> None:
     """Neither input nor filter."""
     with pytest.raises(ModelError, match="pid 'lost'.*nothing to follow"):
         Pid(name="lost", joint="hinge", kp=1.0)
+
+
+def test_filter_behind_the_controller_is_refused() -> None:
+    """Its start would come too late, and v_c would be off by the setpoint for ever."""
+    pid = Pid(name="pid", joint="hinge", offset="filter.setpoint", kp=1.0)
+    system = _system(pid)
+    system.forces = system.forces[::-1]
+    with pytest.raises(ModelError, match="'filter' is declared behind the controller"):
+        pid.place(system)
 
 
 def test_filter_answers_a_step_without_overshoot() -> None:
