@@ -1,0 +1,153 @@
+"""Sparse LU of a fixed pattern, in place and without allocation: factor, solve, solve_transposed.
+
+Right-looking elimination (Duff, Erisman and Reid 2017, ch. 10): step k divides the entries below its pivot by it and
+subtracts multiples of its row from theirs. All targets are tabulated (symbolic.py), so that a factorisation is one
+pass through a list of blocks of eight numbers. The storage array `a` holds the matrix before (zeroed, then
+a[tables.position[e]] += value[e]), and after it L below and U right of the diagonal, with the inverse of each pivot in
+its place. Everything is compiled to be called from compiled code; the same input gives the same bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from dms_core.linear.lanes import WIDTH, dot, eliminate, subtract
+from dms_core.linear.symbolic import LuTables
+
+_U = np.uint64
+_8 = np.uint64(WIDTH)
+_BLOCK = np.uint64(3)  # log2(WIDTH): from an offset to the number of its block
+
+
+def storage(length: int, worlds: int | None = None) -> np.ndarray:
+    """Zeros whose rows start at a cache line (64 bytes), shape (length,) or (worlds, length).
+
+    Blocks that straddle two cache lines take twice the time. Rows of several worlds are kept apart by rounding the
+    distance between them up to whole cache lines.
+    """
+    stride = -(-length // WIDTH) * WIDTH
+    raw = np.zeros(stride * (worlds or 1) + WIDTH)
+    begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
+    block = raw[begin : begin + stride * (worlds or 1)].reshape(-1, stride)[:, :length]
+    return block[0] if worlds is None else block
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def factor(tables, a, work):
+    """Factors in place; returns (smallest relative pivot, its step).
+
+    A pivot is measured against the sum of absolute values that its row held before the elimination: 1e-8 says that
+    eight digits of that row have cancelled. 0 with the step of the first pivot that is zero or not finite means that
+    the factorisation stopped there: row tables.row_of[step], column tables.col_of[step]. After new values have made
+    the ratio much smaller than it was for the values of the order, order anew.
+
+    Args:
+        tables: LuTables of the pattern.
+        a: matrix in, factors out, shape (tables.size,).
+        work: overwritten, shape (tables.work_size,).
+    """
+    for k in range(tables.n):
+        total = 0.0
+        for p in range(tables.first[k], tables.end[k]):
+            total += abs(a[p])
+        work[k] = total
+    smallest, where, t = np.inf, -1, _U(0)
+    for k in range(tables.n):
+        diagonal, lane, end = _U(tables.diagonal[k]), _U(tables.lane[k]), _U(tables.end[k])
+        pivot = a[diagonal + lane]
+        ratio = abs(pivot) / work[k]
+        if not ratio >= smallest:
+            if not 0.0 < ratio < np.inf:
+                return 0.0, k
+            smallest, where = ratio, k
+        inverse = 1.0 / pivot
+        a[diagonal + lane] = inverse
+        for _ in range(tables.below[k]):
+            row = _U(tables.target[t])
+            t += _U(1)
+            multiplier = a[row + lane] * inverse
+            eliminate(a, row, diagonal, lane, multiplier)
+            for block in range(diagonal + _8, end, _8):
+                subtract(a, _U(tables.target[t]), a, block, multiplier)
+                t += _U(1)
+    return smallest, where
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve(tables, a, b, x, work):
+    """x of A x = b from the factors in a; b and x may be the same array.
+
+    Args:
+        tables: LuTables of the pattern.
+        a: factors, shape (tables.size,).
+        b: right-hand side, shape (n,).
+        x: solution, shape (n,).
+        work: overwritten, shape (tables.work_size,).
+    """
+    n = tables.n
+    work[:] = 0.0
+    for k in range(n):
+        slot, diagonal, lane = _U(tables.slot[k]), _U(tables.diagonal[k]), _U(tables.lane[k])
+        y, column = b[tables.row_of[k]], slot - lane
+        for p in range(_U(tables.first[k]), diagonal, _8):
+            y -= dot(a, p, work, _U(tables.group[p >> _BLOCK]))
+        for m in range(lane):
+            y -= a[diagonal + m] * work[column + m]
+        work[slot] = y
+    for r in range(n):
+        k = n - 1 - r
+        slot, diagonal, lane = _U(tables.slot[k]), _U(tables.diagonal[k]), _U(tables.lane[k])
+        y, column = work[slot], slot - lane
+        for p in range(diagonal + _8, _U(tables.end[k]), _8):
+            y -= dot(a, p, work, _U(tables.group[p >> _BLOCK]))
+        for m in range(lane + _U(1), _8):
+            y -= a[diagonal + m] * work[column + m]
+        y *= a[diagonal + lane]
+        work[slot] = y
+        x[tables.col_of[k]] = y
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve_transposed(tables, a, b, x, work):
+    """x of A^T x = b from the factors of A in a; arguments as in solve."""
+    n = tables.n
+    work[:] = 0.0
+    for k in range(n):
+        work[tables.slot[k]] = b[tables.col_of[k]]
+    for k in range(n):
+        slot, diagonal, lane = _U(tables.slot[k]), _U(tables.diagonal[k]), _U(tables.lane[k])
+        y, column = work[slot] * a[diagonal + lane], slot - lane
+        work[slot] = y
+        for m in range(lane + _U(1), _8):
+            work[column + m] -= a[diagonal + m] * y
+        for p in range(diagonal + _8, _U(tables.end[k]), _8):
+            subtract(work, _U(tables.group[p >> _BLOCK]), a, p, y)
+    for r in range(n):
+        k = n - 1 - r
+        slot, diagonal, lane = _U(tables.slot[k]), _U(tables.diagonal[k]), _U(tables.lane[k])
+        y, column = work[slot], slot - lane
+        x[tables.row_of[k]] = y
+        for m in range(lane):
+            work[column + m] -= a[diagonal + m] * y
+        for p in range(_U(tables.first[k]), diagonal, _8):
+            subtract(work, _U(tables.group[p >> _BLOCK]), a, p, y)
+
+
+@njit(cache=True)
+def residual(rows, cols, values, b, x, r):
+    """r = b - A x from the entries of A; a check on a factorisation, and the start of a refinement step."""
+    r[:] = b
+    for e in range(rows.size):
+        r[rows[e]] -= values[e] * x[cols[e]]
+
+
+@njit(cache=True)
+def assemble(tables, values, a):
+    """Writes a matrix given as entries, in the order of tables.position, into the storage array a."""
+    a[:] = 0.0
+    for e in range(values.size):
+        a[tables.position[e]] += values[e]
+
+
+__all__ = ["LuTables", "assemble", "factor", "residual", "solve", "solve_transposed", "storage"]

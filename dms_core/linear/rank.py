@@ -1,0 +1,89 @@
+"""Redundant constraints (paper sect. 4): which rows of phi_q follow from the others, and multipliers made unique.
+
+Dense methods of LAPACK (pivoted QR, singular values), meant for assembly and reports, not for every step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+
+from dms_core.errors import InputError
+
+RANK_TOLERANCE = 1e-9
+"""Of the largest singular value of the normalised rows; kinematic rows are exact to about 1e-14."""
+
+
+class RowRank(NamedTuple):
+    """What independent_rows finds."""
+
+    independent: np.ndarray
+    """Indices of a largest set of independent rows, ascending, shape (rank,)."""
+    redundant: np.ndarray
+    """The other rows, ascending, shape (m - rank,)."""
+    singular_values: np.ndarray
+    """Of the rows scaled to length 1, descending, shape (min(m, n),)."""
+    combination: np.ndarray
+    """C with G[redundant] = C G[independent], shape (m - rank, rank): what each redundant row follows from."""
+
+
+def _checked(G: np.ndarray) -> np.ndarray:
+    """A finite matrix."""
+    G = np.asarray(G, float)
+    if G.ndim != 2 or not np.isfinite(G).all():
+        raise InputError(f"G must be a finite matrix; its shape is {G.shape} and {np.sum(~np.isfinite(G))} are not.")
+    return G
+
+
+def independent_rows(G: np.ndarray, tol: float = RANK_TOLERANCE) -> RowRank:
+    """Rank of G and a set of independent rows.
+
+    Rows are scaled to length 1, as metres and direction cosines mix. The rank is the number of singular values above
+    tol times the largest. The set comes from QR with column pivoting of G^T (Golub and Van Loan 2013, sect. 5.4);
+    weights that fall from 1 to 1/2 along the list make it prefer rows declared earlier, at no loss of safety.
+
+    Args:
+        G: matrix, shape (m, n); m = 0 and rows of zeros are allowed.
+        tol: relative tolerance of the rank.
+    """
+    G = _checked(G)
+    m, n = G.shape
+    if m == 0 or n == 0:
+        none = np.zeros(0, int)
+        return RowRank(none, np.arange(m), np.zeros(0), np.zeros((m, 0)))
+    length = np.linalg.norm(G, axis=1)
+    unit = G / np.where(length > 0.0, length, 1.0)[:, None]
+    values = la.svdvals(unit)
+    rank = int(np.sum(values > tol * max(values[0], 1e-300)))
+    weights = 1.0 - 0.5 * np.arange(m) / m
+    order = la.qr((unit * weights[:, None]).T, mode="r", pivoting=True)[1]
+    independent, redundant = np.sort(order[:rank]), np.sort(order[rank:])
+    combination = np.zeros((redundant.size, rank))
+    if redundant.size and rank:
+        combination = la.lstsq(unit[independent].T, unit[redundant].T)[0].T
+        combination *= length[redundant][:, None] / length[independent][None, :]
+    return RowRank(independent, redundant, values, combination)
+
+
+def minimum_norm(G: np.ndarray, lam: np.ndarray, tol: float = RANK_TOLERANCE) -> np.ndarray:
+    """The shortest multipliers with the same constraint force G^T lam: lam* = G (G^T G)^+ G^T lam.
+
+    With redundant constraints only G^T lam is determined by the motion. Of all lam with that force, lam* is the
+    projection on the range of G. It shares the load among redundant rows as equal springs would, so that single
+    reactions of a redundant joint are a convention (and depend on the units of the rows), while their sum is not.
+
+    Args:
+        G: phi_q, shape (m, n).
+        lam: multipliers, shape (m,) or several as columns, shape (m, k).
+        tol: singular values below tol times the largest count as zero.
+    """
+    G, lam = _checked(G), np.asarray(lam, float)
+    if lam.shape[:1] != G.shape[:1]:
+        raise InputError(f"lam has shape {lam.shape}; G has {G.shape[0]} rows.")
+    if G.size == 0:
+        return np.zeros_like(lam)
+    left, values, _ = la.svd(G, full_matrices=False)
+    basis = left[:, values > tol * max(values[0], 1e-300)]
+    return basis @ (basis.T @ lam)
