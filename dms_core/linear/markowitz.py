@@ -35,7 +35,7 @@ class Lines(NamedTuple):
 
 @njit(cache=True)
 def equilibrated(n, start, index, data):
-    """A copy of data with the largest entry of each row and column near 1 (Ruiz: each pass halves the digits of spread)."""
+    """A copy of data with largest entries near 1 in all lines (Ruiz 2001: each pass halves the digits of spread)."""
     x = np.abs(data)
     for _ in range(5):
         row, col = np.zeros(n), np.zeros(n)

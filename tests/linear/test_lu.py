@@ -24,7 +24,7 @@ def solved(tables, values, b, transposed=False):
 
 
 def backward_error(A, x, b):
-    """Largest |b - A x| / (|A| |x| + |b|): the relative change of the entries that would explain x (Oettli, Prager 1964)."""
+    """Relative change of the entries that would explain x: |b - A x| / (|A| |x| + |b|) (Oettli and Prager 1964)."""
     return np.max(np.abs(b - A @ x) / (np.abs(A) @ np.abs(x) + np.abs(b)))
 
 
