@@ -6,7 +6,8 @@ and scatters what it wrote; the element never learns where its numbers go.
 
 Local coordinates: seven per body named in `Placement.bodies` (position of the centre of mass, Euler parameters;
 the ground and a point mass look like bodies whose missing coordinates are constant), then `Placement.coordinates`.
-All outputs are zero before a kernel is called. `level` is 0 for values, 1 for values and derivatives.
+The local arrays are work space of the largest size any element needs, so that a kernel must know its own sizes (from
+`ip`) and never ask for len(q). All outputs are zero before a kernel is called. `level` is 0 for values, 1 for values and derivatives.
 
 Dynamic kernel (bodies, forces, ropes, muscles, controllers): rows of M vdot + phi_q^T lam - f = 0
 
@@ -25,6 +26,10 @@ Sensor kernel: y = h(q, v, vdot, lam, u)
     kernel(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu)
 
 `ip` and `par` are the integers and numbers of `Placement`; `u[k]` is (value, rate, second derivative) of input k.
+
+An element whose own coordinates depend on the assembled position (a fibre in equilibrium, a controller's error) may
+have a method `start_states(system, q, u)` that gives one pair (value, rate) for each coordinate it owns, from the local
+coordinates q and inputs u (k, 3) of its first placement at the start.
 """
 
 from __future__ import annotations

@@ -1,0 +1,112 @@
+"""From names to numbers: which coordinate, row and input has which index (paper eq. 1 to 4).
+
+The vector q is followed by the ground's seven constant coordinates (0, 0, 0, 1, 0, 0, 0), so that an element on the
+ground reads and writes like any other; what it writes to the ground's rows falls into slots nobody reads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dms_core.errors import ModelError, choices
+from dms_core.model.element import GROUND, Constraint, Coordinate, DynamicElement, Placement, Sensor
+from dms_core.model.system import System
+
+GROUND_COORDINATES = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Call:
+    """One kernel call: the element, its placement, and the global indices of its local data."""
+
+    element: DynamicElement | Constraint | Sensor
+    placement: Placement
+    iq: np.ndarray
+    """Global coordinate of each local one, shape (n,); n_q + k for the ground's k-th constant."""
+    iu: np.ndarray
+    """Global input of each local one."""
+    row: int = 0
+    """First constraint row (constraints), first component of y (sensors)."""
+    rows: int = 0
+    """Number of constraint rows or of sensor components."""
+
+
+class Layout:
+    """Indices of everything a system declares.
+
+    Args:
+        system: the declarations.
+
+    Raises:
+        ModelError: an element names a body, coordinate or input that does not exist.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.coordinates: list[Coordinate] = []
+        self.names: list[str] = []
+        self.offset: dict[str, int] = {}
+        for element in (*system.bodies, *system.forces):
+            self.offset[element.name] = len(self.names)
+            for c in element.coordinates():
+                self.coordinates.append(c)
+                self.names.append(f"{element.name}.{c.name}")
+        self.n_q = len(self.names)
+        if self.n_q == 0:
+            raise ModelError(f"system '{system.name}' has no coordinates: declare at least one body or equation.")
+        self.index = {name: k for k, name in enumerate(self.names)}
+        self.input_index = {u.name: k for k, u in enumerate(system.inputs)}
+        self.dynamics = [
+            self._call(e, p) for e in (*system.bodies, *system.forces) for p in e.placements(system)
+        ]
+        self.constraints: list[Call] = []
+        self.row_names: list[str] = []
+        for constraint in system.constraints:
+            rows = constraint.rows()
+            self.constraints.append(self._call(constraint, constraint.place(system), len(self.row_names), len(rows)))
+            self.row_names += [f"{constraint.name}.{row}" for row in rows]
+        self.n_phi = len(self.row_names)
+        self.sensors: list[Call] = []
+        self.outputs: list[tuple[str, str]] = []
+        for sensor in system.sensors:
+            parts = sensor.outputs()
+            self.sensors.append(self._call(sensor, sensor.place(system), len(self.outputs), len(parts)))
+            self.outputs += [(f"{sensor.name}.{part}" if part else sensor.name, unit) for part, unit in parts]
+
+    def body_indices(self, name: str) -> np.ndarray:
+        """Global indices of a body's seven local coordinates."""
+        ground = self.n_q + np.arange(7)
+        if name == GROUND:
+            return ground
+        if self.system.body(name).rigid:  # type: ignore[union-attr]
+            return self.offset[name] + np.arange(7)
+        return np.concatenate([self.offset[name] + np.arange(3), ground[3:]])
+
+    def _call(self, element, placement: Placement, row: int = 0, rows: int = 0) -> Call:
+        who = f"{element.kind} '{element.name}'"
+        iq = [self.body_indices(b) for b in placement.bodies]
+        iq.append(np.array([self._find(c, self.index, "coordinate", who) for c in placement.coordinates], int))
+        iu = np.array([self._find(u, self.input_index, "input", who) for u in placement.inputs], int)
+        return Call(element, placement, np.concatenate(iq).astype(np.int32), iu.astype(np.int32), row, rows)
+
+    @staticmethod
+    def _find(name: str, table: dict[str, int], what: str, who: str) -> int:
+        if name not in table:
+            raise ModelError(f"{who}: {what} '{name}' does not exist. Declared: {choices(table)}.")
+        return table[name]
+
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """Declared q and v with the ground behind them, each of shape (n_q + 7,)."""
+        q = np.concatenate([[c.start for c in self.coordinates], GROUND_COORDINATES])
+        v = np.concatenate([[c.rate for c in self.coordinates], np.zeros(7)])
+        return q, v
+
+    def constraint_rows(self, name: str) -> slice:
+        """Rows of phi that belong to the constraint of that name."""
+        for call in self.constraints:
+            if call.element.name == name:
+                return slice(call.row, call.row + call.rows)
+        names = [c.element.name for c in self.constraints]
+        raise ModelError(f"constraint '{name}' does not exist. Declared: {choices(names)}.")

@@ -1,0 +1,180 @@
+"""A system compiled: laid out, assembled, its linear systems ordered once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dms_core.assembly.arena import Packed
+from dms_core.assembly.layout import Layout
+from dms_core.assembly.residual import dense_constraints, evaluate_inputs, evaluate_newton, evaluate_rates
+from dms_core.assembly.sensing import Partials, composition, evaluate_partials, measure
+from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
+from dms_core.assembly.tables import Signals, Work, all_calls, new_work, signal_tables
+from dms_core.errors import AssemblyError, ModelError
+from dms_core.linear.ordering import SingularMatrixError
+from dms_core.linear.rank import minimum_norm
+from dms_core.linear.symbolic import LuTables, plan
+from dms_core.model.system import System
+from dms_core.simulation.initial_conditions import Start, assemble
+from dms_core.simulation.state import Tables, new_state
+
+TYPICAL_C0 = 1.5e3
+"""c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen."""
+
+
+@dataclass
+class LinearSystem:
+    """One sparse matrix of the model: its scatter by number, and where the elimination order puts the numbers."""
+
+    pattern: Any
+    rows: np.ndarray
+    columns: np.ndarray
+    names: list[str]
+    values: np.ndarray = field(init=False)
+
+    def ordered(self, values: np.ndarray) -> tuple[Any, LuTables]:
+        """(scatter into the LU, LU tables) for an elimination order chosen by these values.
+
+        Raises:
+            ModelError: the matrix is singular; names the unknowns that nothing determines.
+        """
+        try:
+            lu = plan(len(self.names), self.rows, self.columns, values)
+        except SingularMatrixError as error:
+            names = ", ".join(f"'{self.names[k]}'" for k in error.columns[:4])
+            raise ModelError(
+                f"the equations are singular: no equation determines {names}. Look for a body without inertia along a "
+                "free direction, or an element whose row does not contain its own coordinate."
+            ) from error
+        return moved(self.pattern, lu.position), lu
+
+
+class Model:
+    """A compiled system: constant tables, a consistent start, and functions of state.
+
+    Args:
+        system: the declarations. Kernels are compiled on first use and kept in numba's disk cache.
+
+    Raises:
+        ModelError: a declaration does not fit the others.
+        AssemblyError: no consistent start exists; names the constraint and by how much it is open.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.layout = layout = Layout(system)
+        self.n_q, self.n_phi = layout.n_q, layout.n_phi
+        self._dynamics, self._constraints, self._sensors = (Packed(calls) for calls in all_calls(layout))
+        self._signals, self._keep_alive = signal_tables(layout)
+        self.second_order = np.array([c.differential_rate for c in layout.coordinates])
+        self.start: Start = assemble(self)
+        self._tables = Packed(self._order())
+        self._composed = Packed(composition(layout))
+        self._sensor_work = Packed(self.new_work())
+
+    @property
+    def active_rows(self) -> np.ndarray:
+        """Constraint rows that are solved for; the others follow from them."""
+        return self.start.active
+
+    @property
+    def redundant_rows(self) -> list[str]:
+        """Names of constraint rows that the others imply."""
+        return [self.layout.row_names[k] for k in self.start.redundant]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Second-order coordinates less independent rows: mechanical freedoms and second-order elements."""
+        return int(self.second_order.sum()) - len(self.start.active)
+
+    def new_work(self) -> Work:
+        """Fresh work arrays of this model."""
+        return new_work(self.layout)
+
+    def new_state(self) -> Packed:
+        """A world (a packed State) at the consistent start, with inputs of its own."""
+        signals = self._signals._replace(c=self._signals.c.copy())
+        return new_state(self._tables.values, self.new_work(), signals, self.start.q, self.start.v)
+
+    @property
+    def tables(self) -> Packed:
+        """Constant tables (a packed Tables) for the compiled solver."""
+        return self._tables
+
+    def _order(self) -> Tables:
+        """Elimination orders of both linear systems, from their values at the start."""
+        layout, active = self.layout, self.start.active.astype(np.int32)
+        work = self.new_work()
+        work.q[: self.n_q], work.v[: self.n_q] = self.start.q, self.start.v
+        w, dynamics, constraints = Packed(work), self._dynamics.table, self._constraints.table
+        evaluate_inputs(Packed(self._signals).table, 0.0, False, w.table)
+        rows = [layout.row_names[k] for k in active]
+        names = [*(f"{n} (position)" for n in layout.names), *(f"{n} (velocity)" for n in layout.names)]
+        newton, slots = newton_pattern(layout, active)
+        values, packed = np.zeros(len(slots.number)), Packed(newton)
+        evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, values)
+        newton, newton_lu = LinearSystem(
+            newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
+        ).ordered(values)
+        rates, slots = rate_pattern(layout, active)
+        values, packed = np.zeros(len(slots.number)), Packed(rates)
+        evaluate_rates(dynamics, constraints, packed.table, w.table, values)
+        rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*layout.names, *rows]).ordered(values)
+        scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
+        return Tables(
+            self._dynamics.values, self._constraints.values, self._sensors.values, newton, newton_lu, rates, rate_lu, active,
+            self.second_order, np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1]),
+        )  # fmt: skip
+
+    def input_index(self, name: str) -> int:
+        """Index of an input; an unknown name is an error that lists the inputs."""
+        self.system.element(name)
+        return self.layout._find(name, self.layout.input_index, "input", f"system '{self.system.name}'")
+
+    def constraint_jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[np.ndarray, ...]:
+        """(phi, phi_q v + phi_t, phi_q, (phi_q v)_q) at q, v: shapes (n_phi,), (n_phi,), (n_phi, n_q) twice."""
+        w = self.new_work()
+        w.q[: self.n_q] = q
+        w.v[: self.n_q] = 0.0 if v is None else v
+        packed = Packed(w)
+        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
+        G, W = np.zeros((self.n_phi, self.n_q + 7)), np.zeros((self.n_phi, self.n_q + 7))
+        dense_constraints(self._constraints.table, packed.table, G, W)
+        return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]
+
+    def make_multipliers_unique(self, q: np.ndarray, lam: np.ndarray) -> None:
+        """Replace each row of lam by the least-norm multipliers of the same constraint force phi_q^T lam.
+
+        With redundant constraints only the force is determined, not its share per joint; the least norm is a
+        convention, and a reaction read from it is one of many possible ones.
+        """
+        if not len(self.start.redundant):
+            return
+        for k in range(len(q)):
+            lam[k] = minimum_norm(self.constraint_jacobian(q[k])[2], lam[k])
+
+    def measure(self, t, q, v, a, lam, behind, signals: Signals | None = None) -> np.ndarray:  # noqa: ANN001
+        """Sensors at given states: shape (k, n_y)."""
+        y = np.zeros((len(t), len(self.layout.outputs)))
+        measure(
+            self._dynamics.table, self._constraints.table, self._sensors.table, self._composed.table,
+            Packed(signals or self._signals).table, self._sensor_work.table, t, q, v, a, lam, behind, y,
+        )  # fmt: skip
+        return y
+
+    def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
+        """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense."""
+        n_y, w = len(self.layout.outputs), self._sensor_work.values
+        w.q[: self.n_q], w.v[: self.n_q], w.a[: self.n_q], w.lam[:] = q, v, a, lam
+        evaluate_inputs(Packed(self._signals).table, t, False, self._sensor_work.table)
+        shapes = (self.n_q + 7, self.n_q + 7, self.n_q + 7, self.n_phi, len(self.layout.input_index))
+        into = Partials(*(np.zeros((n_y, k)) for k in shapes))
+        packed = Packed(into)
+        evaluate_partials(
+            self._dynamics.table, self._constraints.table, self._sensors.table, self._composed.table,
+            self._sensor_work.table, packed.table,
+        )  # fmt: skip
+        return Partials(into.q[:, : self.n_q], into.v[:, : self.n_q], into.a[:, : self.n_q], into.lam, into.u)

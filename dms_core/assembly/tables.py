@@ -1,0 +1,184 @@
+"""The compiled form of a system: constant tables and mutable work arrays, both plain tuples of arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dms_core.assembly.calls import SIGNAL, address
+from dms_core.assembly.layout import Call, Layout
+from dms_core.errors import InputError
+from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
+from dms_core.model.signals import Function, Harmonic
+
+POLYNOMIAL, HARMONIC, FUNCTION = 0, 1, 2
+
+
+class Calls(NamedTuple):
+    """Kernel calls of one kind. Slices of the flat arrays belong to call e: x[x_ptr[e] : x_ptr[e + 1]]."""
+
+    kernel: np.ndarray
+    """Addresses, (n_calls,)."""
+    iq: np.ndarray
+    iq_ptr: np.ndarray
+    iu: np.ndarray
+    iu_ptr: np.ndarray
+    ip: np.ndarray
+    ip_ptr: np.ndarray
+    par: np.ndarray
+    par_ptr: np.ndarray
+    row: np.ndarray
+    """First row of each call; row[e + 1] ends it, (n_calls + 1,)."""
+
+
+class Signals(NamedTuple):
+    """Inputs u(t); mutable, so that a value can be set between calls of the solver."""
+
+    kind: np.ndarray
+    t: np.ndarray
+    """Starts of all pieces [s], flat."""
+    c: np.ndarray
+    """Coefficients of all pieces, (n_pieces, 6); amplitude, 2 pi frequency, phase, offset of a harmonic."""
+    ptr: np.ndarray
+    address: np.ndarray
+    jumps: np.ndarray
+    """All times of discontinuity [s], sorted."""
+
+
+class Work(NamedTuple):
+    """Arrays that evaluation writes. Global vectors carry the ground's seven slots behind n_q."""
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    """vdot."""
+    lam: np.ndarray
+    mu: np.ndarray
+    u: np.ndarray
+    """(n_u, 3): value, first, second derivative."""
+    y: np.ndarray
+    r2: np.ndarray
+    """M vdot + phi_q^T lam - f, (n_q + 7,)."""
+    gmu: np.ndarray
+    """phi_q^T mu, (n_q + 7,)."""
+    phi: np.ndarray
+    phi_v: np.ndarray
+    """phi_q v + phi_t."""
+    phi_a: np.ndarray
+    """phi_q vdot + (phi_q v)_q v + phi_tt; only where asked."""
+    # Local arrays of one kernel call.
+    q_l: np.ndarray
+    v_l: np.ndarray
+    a_l: np.ndarray
+    lam_l: np.ndarray
+    u_l: np.ndarray
+    r_l: np.ndarray
+    Jq: np.ndarray
+    Jv: np.ndarray
+    Ja: np.ndarray
+    phi_l: np.ndarray
+    phi_t_l: np.ndarray
+    G: np.ndarray
+    W: np.ndarray
+    H: np.ndarray
+    y_l: np.ndarray
+    Yq: np.ndarray
+    Yv: np.ndarray
+    Ya: np.ndarray
+    Yl: np.ndarray
+    Yu: np.ndarray
+
+
+def _flat(parts: list[Any], dtype: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Concatenate and give the pointers."""
+    arrays = [np.asarray(p, dtype) for p in parts]
+    ptr = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
+    return np.ascontiguousarray(np.concatenate([np.zeros(0, dtype), *arrays])), ptr
+
+
+def call_tables(calls: list[Call], signature: Any) -> Calls:
+    """Tables of all calls of one kind; kernels are compiled here, or loaded from numba's cache."""
+    kernels = [
+        address(type(c.element).kernel, signature, f"{c.element.kind} '{c.element.name}'") if type(c.element).kernel is not None else 0
+        for c in calls
+    ]
+    return Calls(
+        np.array(kernels, np.int64),
+        *_flat([c.iq for c in calls], np.int32),
+        *_flat([c.iu for c in calls], np.int32),
+        *_flat([c.placement.integers for c in calls], np.int32),
+        *_flat([c.placement.numbers for c in calls], np.float64),
+        np.array([c.row for c in calls] + [sum(c.rows for c in calls)], np.int64),
+    )
+
+
+def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:
+    """Tables of dynamics, constraints and sensors."""
+    return (
+        call_tables(layout.dynamics, DYNAMIC),
+        call_tables(layout.constraints, CONSTRAINT),
+        call_tables(layout.sensors, SENSOR),
+    )
+
+
+def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
+    """Tables of all inputs, and the compiled user functions that must be kept alive."""
+    from numba import njit
+
+    kinds, starts, coefficients, addresses, jumps, keep = [], [], [], [], [np.zeros(0)], []
+    for item in layout.system.inputs:
+        signal, pointer = item.signal, 0
+        t, c = np.zeros(1), np.zeros((1, 6))
+        if isinstance(signal, Harmonic):
+            kind = HARMONIC
+            c[0, :4] = signal.amplitude, 2.0 * np.pi * signal.frequency, signal.phase, signal.offset
+        elif isinstance(signal, Function):
+            kind = FUNCTION
+            jumps.append(np.array(signal.jumps))
+            course = njit(signal.function)
+
+            def write(t, out, course=course):
+                out[0], out[1], out[2] = course(t)
+
+            compiled = njit(write)
+            try:
+                pointer = address(compiled, SIGNAL, f"input '{item.name}'")
+            except Exception as error:
+                raise InputError(
+                    f"input '{item.name}': its function cannot be compiled by numba; it must take t [s] and return "
+                    f"(value, first, second derivative).\n{error}"
+                ) from error
+            keep.append(compiled)
+        else:
+            kind = POLYNOMIAL
+            t, c, jump = signal.pieces()
+            jumps.append(jump)
+        kinds.append(kind)
+        starts.append(t)
+        coefficients.append(c)
+        addresses.append(pointer)
+    flat, ptr = _flat(starts, np.float64)
+    c = np.ascontiguousarray(np.concatenate([np.zeros((0, 6)), *coefficients]))
+    events = np.unique(np.concatenate(jumps))
+    return Signals(np.array(kinds, np.int64), flat, c, ptr, np.array(addresses, np.int64), events), keep
+
+
+def new_work(layout: Layout) -> Work:
+    """Fresh work arrays, the ground's coordinates in place."""
+    calls = [*layout.dynamics, *layout.constraints, *layout.sensors]
+    n = max([len(c.iq) for c in calls] + [7])
+    m = max([c.rows for c in layout.constraints] + [1])
+    k = max([len(c.iu) for c in calls] + [1])
+    y = max([c.rows for c in layout.sensors] + [1])
+    big = layout.n_q + 7
+    zeros = np.zeros
+    q, v = layout.start()
+    square = [zeros((n, n)) for _ in range(3)]
+    return Work(
+        q, v, zeros(big), zeros(layout.n_phi), zeros(layout.n_phi), zeros((len(layout.input_index), 3)),
+        zeros(len(layout.outputs)), zeros(big), zeros(big), zeros(layout.n_phi), zeros(layout.n_phi), zeros(layout.n_phi),
+        zeros(n), zeros(n), zeros(n), zeros(m), zeros((k, 3)), zeros(n), *square,
+        zeros(m), zeros((m, 2)), zeros((m, n)), zeros((m, n)), zeros((n, n)),
+        zeros(y), zeros((y, n)), zeros((y, n)), zeros((y, n)), zeros((y, m)), zeros((y, k)),
+    )  # fmt: skip

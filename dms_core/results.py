@@ -1,0 +1,175 @@
+"""What a run gives back: a result code with a sentence, statistics, and the trajectory with dense output."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dms_core.errors import DmsError, SimulationError, choices
+
+if TYPE_CHECKING:
+    from dms_core.assembly.model import Model
+
+
+class Result(Enum):
+    """How a run ended; the value is the sentence shown to the user."""
+
+    SUCCESS = "The run reached its end time."
+    STEP_TOO_SMALL = "The error test asked for a step below the smallest allowed one; loosen rtol or look for a discontinuity that no input table declares."  # noqa: E501
+    NEWTON_FAILED = "Newton's method did not converge at the smallest allowed step; look for a force without a derivative, or take a smaller fixed step."  # noqa: E501
+    MATRIX_SINGULAR = "The Newton matrix is singular: the mechanism is in a singular position or a body has no inertia along a free direction."  # noqa: E501
+    TOO_MANY_STEPS = "The largest number of steps was used up before the end time; raise max_steps or loosen rtol."
+    RATES_FAILED = "No accelerations and multipliers satisfy the equations at a start or jump; look for an input far out of range."  # noqa: E501
+    INTERRUPTED = "The run was interrupted by the user; what was computed before is complete."
+
+
+@dataclass(frozen=True)
+class SolveStats:
+    """Counts and worst errors of a run."""
+
+    steps: int
+    """Accepted steps."""
+    rejected_error: int
+    """Steps repeated because the local error was too large."""
+    rejected_newton: int
+    """Steps repeated because Newton did not converge."""
+    newton_iterations: int
+    factorisations: int
+    restarts: int
+    """Starts of the method: one, and one for each jump of an input."""
+    largest_phi: float
+    """Largest |phi| over all rows and steps, redundant rows included [m or -]."""
+    largest_phi_v: float
+    """Largest |phi_q v + phi_t| [m/s or 1/s]."""
+    largest_mu: float
+    """Largest |mu|: zero on an exact solution, a measure of the constraint error made by the method."""
+    smallest_step: float
+    """[s]"""
+    largest_step: float
+    """[s]"""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+class Trajectory:
+    """States, multipliers and sensors of a run, on the solver's own steps and at any time between.
+
+    At a jump of an input the time appears twice: values before it, then values behind it.
+
+    Attributes:
+        t: solver times [s], shape (n,).
+        q, v, a: coordinates, velocities, accelerations at these times, shape (n, n_q).
+        lam, mu: multipliers, shape (n, n_phi); unique (least norm) where constraints are redundant.
+        result: how the run ended; `message` is its sentence with time and numbers.
+        stats: counts and worst errors.
+    """
+
+    def __init__(self, model: Model, record: np.ndarray, result: Result, stats: SolveStats, message: str) -> None:
+        n, m = model.n_q, model.n_phi
+        self.model = model
+        self.t = record[:, 0].copy()
+        self.q, self.v, self.a = (record[:, 1 + k * n : 1 + (k + 1) * n].copy() for k in range(3))
+        self.lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
+        self.mu = record[:, 1 + 3 * n + m :].copy()
+        self.result, self.stats, self.message = result, stats, message
+        model.make_multipliers_unique(self.q, self.lam)
+
+    @property
+    def success(self) -> bool:
+        """True when the end time was reached."""
+        return self.result is Result.SUCCESS
+
+    def check(self) -> Trajectory:
+        """This trajectory, or SimulationError with the result's sentence when the run failed."""
+        if not self.success:
+            raise SimulationError(self.message)
+        return self
+
+    def at(self, times: Any) -> States:
+        """Dense output: states at any times inside the run; at a jump the value before it.
+
+        q is the cubic through q and v at both ends of a step, v that through v and vdot (for first-order coordinates
+        the slope of q), vdot its slope; lam and mu are linear in a step. All are of the method's order, 2.
+
+        Args:
+            times: [s], shape (k,), between the first and the last recorded time.
+
+        Raises:
+            DmsError: a time is outside the run.
+        """
+        times = np.atleast_1d(np.asarray(times, float))
+        slack = 1e-12 * max(1.0, abs(self.t[-1]))
+        if len(times) and (times.min() < self.t[0] - slack or times.max() > self.t[-1] + slack):
+            raise DmsError(
+                f"times {times.min():.6g} ... {times.max():.6g} s asked for, but the run covers "
+                f"{self.t[0]:.6g} ... {self.t[-1]:.6g} s ({self.result.value})"
+            )
+        end = np.clip(np.searchsorted(self.t, times, side="left"), 1, len(self.t) - 1)
+        start = end - 1
+        h = (self.t[end] - self.t[start])[:, None]
+        h = np.where(h > 0.0, h, 1.0)
+        x = (times - self.t[start])[:, None] / h
+        second = self.model.second_order
+        q, slope_q, _ = _hermite(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
+        v, slope_v, _ = _hermite(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
+        line = lambda y: (1.0 - x) * y[start] + x * y[end]  # noqa: E731
+        return States(
+            self.model, times, q, np.where(second, v, slope_q), np.where(second, slope_v, 0.0), line(self.lam), line(self.mu)
+        )
+
+    def own_steps(self) -> States:
+        """States on the solver's own steps."""
+        return States(self.model, self.t, self.q, self.v, self.a, self.lam, self.mu, _behind_jumps(self.t))
+
+    def sensors(self, times: Any = None) -> dict[str, np.ndarray]:
+        """All sensors by name, on the solver's own steps or at the given times [s]."""
+        return (self.own_steps() if times is None else self.at(times)).sensors()
+
+
+class States:
+    """States at given times, and what the model's sensors read there."""
+
+    def __init__(self, model: Model, t, q, v, a, lam, mu, behind=None) -> None:  # noqa: ANN001
+        self.model = model
+        self.t, self.q, self.v, self.a, self.lam, self.mu = t, q, v, a, lam, mu
+        self.behind = np.zeros(len(t), bool) if behind is None else behind
+
+    def coordinate(self, name: str) -> np.ndarray:
+        """q of the coordinate of that name, shape (k,)."""
+        return self.q[:, self._index(name)]
+
+    def rate(self, name: str) -> np.ndarray:
+        """v of the coordinate of that name, shape (k,)."""
+        return self.v[:, self._index(name)]
+
+    def _index(self, name: str) -> int:
+        index = self.model.layout.index
+        if name not in index:
+            raise DmsError(f"coordinate '{name}' does not exist. There are: {choices(index)}.")
+        return index[name]
+
+    def sensors(self) -> dict[str, np.ndarray]:
+        """Every component of every sensor by name, shape (k,) each."""
+        y = self.model.measure(self.t, self.q, self.v, self.a, self.lam, self.behind)
+        return {name: y[:, k] for k, (name, _) in enumerate(self.model.layout.outputs)}
+
+
+def _hermite(x, h, y0, y1, d0, d1):  # noqa: ANN001, ANN202
+    """Cubic through values and slopes at both ends: value, first derivative, second derivative at x in [0, 1]."""
+    e = y1 - y0
+    b, c = 3.0 * e - h * (2.0 * d0 + d1), h * (d0 + d1) - 2.0 * e
+    value = y0 + x * (h * d0 + x * (b + x * c))
+    return value, d0 + x * (2.0 * b + 3.0 * x * c) / h, (2.0 * b + 6.0 * x * c) / (h * h)
+
+
+def _behind_jumps(t: np.ndarray) -> np.ndarray:
+    """True at the second of two equal times, and at the first time: the limit from the right."""
+    behind = np.zeros(len(t), bool)
+    behind[:1] = True
+    behind[1:] = np.diff(t) == 0.0
+    return behind

@@ -1,0 +1,191 @@
+"""Running a model in time: one call for a whole run, or a simulation that is advanced and steered step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dms_core.assembly.model import Model
+from dms_core.errors import InputError, SimulationError
+from dms_core.model.signals import Constant
+from dms_core.model.system import System
+from dms_core.results import Result, SolveStats, Trajectory
+from dms_core.simulation import step_control
+from dms_core.simulation.state import (
+    FACTORISATIONS,
+    H_LEAST,
+    H_MOST,
+    ITERATIONS,
+    MU,
+    PHI,
+    PHI_V,
+    REJECTED_ERROR,
+    REJECTED_NEWTON,
+    RESTART,
+    RESTARTS,
+    STEPS,
+    Options,
+    State,
+    T,
+)
+
+BUFFER_ROWS = 256
+"""Steps recorded between two returns to Python: short enough for a smooth progress bar."""
+
+_RESULTS = {
+    step_control.STEP_TOO_SMALL: Result.STEP_TOO_SMALL,
+    step_control.NEWTON_FAILED: Result.NEWTON_FAILED,
+    step_control.MATRIX_SINGULAR: Result.MATRIX_SINGULAR,
+    step_control.TOO_MANY_STEPS: Result.TOO_MANY_STEPS,
+    step_control.RATES_FAILED: Result.RATES_FAILED,
+}
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """How a run is solved. The defaults keep the elbow angle of the default system within about 1e-5 rad."""
+
+    rtol: float = 1e-5
+    """Relative tolerance of the local error per step [-]."""
+    atol: float | None = None
+    """Absolute tolerance of every variable in its own unit; None takes rtol times each variable's nominal size."""
+    fixed_step: float | None = None
+    """Constant step [s]; None for error control."""
+    h_max: float = 0.1
+    """Largest step [s]."""
+    h_min: float = 1e-12
+    """Step below which a run gives up [s]."""
+    newton_tol: float = 0.03
+    """Largest error left by Newton's method, in units of the tolerance [-]."""
+    constraint_tol: float = 1e-10
+    """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s]."""
+    max_steps: int = 10_000_000
+    """Steps after which a run gives up."""
+
+    def __post_init__(self) -> None:
+        for name in ("rtol", "h_max", "h_min", "newton_tol", "constraint_tol", "max_steps"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"solver option {name} = {value!r}; a positive number is wanted.")
+        for name in ("atol", "fixed_step"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"solver option {name} = {value!r}; a positive number or None is wanted.")
+
+    def numbers(self) -> Options:
+        """For compiled code."""
+        return Options(
+            self.rtol, self.atol or 0.0, self.fixed_step or 0.0, self.h_max, self.h_min, self.newton_tol,
+            self.constraint_tol, self.max_steps,
+        )  # fmt: skip
+
+
+class Simulation:
+    """One world that is advanced in time, with inputs set between calls.
+
+    Args:
+        model: a compiled Model, or a System to compile.
+        options: solver options.
+    """
+
+    def __init__(self, model: Model | System, options: SolverOptions | None = None) -> None:
+        self.model = model if isinstance(model, Model) else Model(model)
+        self.options = options or SolverOptions()
+        self._numbers = self.options.numbers()
+        self._world = self.model.new_state()
+        self.state: State = self._world.values
+        self._rows: list[np.ndarray] = []
+        self._buffer = np.zeros((BUFFER_ROWS, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
+        self._settings: dict[int, list[tuple[float, float]]] = {}
+        self.result = Result.SUCCESS
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return float(self.state.clock[T])
+
+    def set_input(self, name: str, value: float) -> None:
+        """Hold the input `name` at `value` from now on; the method starts afresh behind the jump.
+
+        Raises:
+            InputError: the value is not finite, or the input is declared as a course in time.
+        """
+        k = self.model.input_index(name)
+        signal = self.model.system.inputs[k].signal
+        if not isinstance(signal, Constant):
+            raise InputError(f"input '{name}' is declared as a course in time ({signal.kind}); only a constant one can be set.")
+        if not math.isfinite(value):
+            raise InputError(f"input '{name}' = {value}; a finite number is wanted.")
+        row = self.state.signals.ptr[k]
+        if self.state.signals.c[row, 0] != value:
+            self._settings.setdefault(k, [(-1.0, float(self.state.signals.c[row, 0]))]).append((self.time, float(value)))
+            self.state.signals.c[row, 0] = value
+            self.state.count[RESTART] = 1
+
+    def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
+        """Step until t_end [s]; `progress` is called with the time reached now and then.
+
+        Returns:
+            SUCCESS, or what stopped the run: what was computed is kept and finite.
+        """
+        if not math.isfinite(t_end) or t_end < self.time:
+            raise InputError(f"t_end = {t_end} s; a time not before the present {self.time:.6g} s is wanted.")
+        code = step_control.BUFFER_FULL
+        try:
+            while code == step_control.BUFFER_FULL:
+                code, count = step_control.advance(
+                    self.model.tables.table, self._world.table, self._numbers, float(t_end), self._buffer, 0
+                )
+                self._rows.append(self._buffer[:count].copy())
+                if progress is not None:
+                    progress(self.time)
+        except KeyboardInterrupt:
+            self.result = Result.INTERRUPTED
+            return self.result
+        self.result = _RESULTS.get(code, Result.SUCCESS)
+        return self.result
+
+    def stats(self) -> SolveStats:
+        """Counts and worst errors so far."""
+        c, x = self.state.count, self.state.largest
+        return SolveStats(
+            int(c[STEPS]), int(c[REJECTED_ERROR]), int(c[REJECTED_NEWTON]), int(c[ITERATIONS]), int(c[FACTORISATIONS]),
+            int(c[RESTARTS]), float(x[PHI]), float(x[PHI_V]), float(x[MU]),
+            float(x[H_LEAST]) if c[STEPS] else 0.0, float(x[H_MOST]),
+        )  # fmt: skip
+
+    def trajectory(self) -> Trajectory:
+        """Everything computed so far."""
+        if not self._rows or not sum(len(r) for r in self._rows):
+            raise SimulationError(f"nothing was computed: {self.result.value}")
+        message = self.result.value
+        if self.result is not Result.SUCCESS:
+            message = f"{message} Stopped at t = {self.time:.6g} s."
+        trajectory = Trajectory(self.model, np.concatenate(self._rows), self.result, self.stats(), message)
+        trajectory.settings = self._settings
+        return trajectory
+
+
+def simulate(
+    model: Model | System,
+    t_end: float,
+    options: SolverOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Run a model from its assembled start to t_end [s].
+
+    Example:
+        >>> trajectory = simulate(system, 2.0, SolverOptions(rtol=1e-6))
+        >>> trajectory.at([0.5, 1.0]).coordinate("rod.x")
+
+    Raises:
+        InputError: t_end is not positive, or an option is out of range.
+    """
+    if not (math.isfinite(t_end) and t_end > 0.0):
+        raise InputError(f"t_end = {t_end} s; a positive time is wanted.")
+    simulation = Simulation(model, options)
+    simulation.advance(t_end, progress)
+    return simulation.trajectory()

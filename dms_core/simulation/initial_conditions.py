@@ -1,0 +1,134 @@
+"""A consistent start: positions on phi = 0, velocities on phi_q v + phi_t = 0, fibres in equilibrium, independent rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dms_core.assembly.arena import Packed
+from dms_core.assembly.residual import evaluate_inputs
+from dms_core.errors import AssemblyError
+from dms_core.linear.rank import independent_rows
+
+if TYPE_CHECKING:
+    from dms_core.assembly.model import Model
+
+MAX_ITERATIONS = 60
+TOLERANCE = 1e-13
+"""Positions are assembled to rounding, so that a run does not start with a constraint error."""
+ACCEPTED = 1e-10
+"""Constraint error at which a stalled assembly still counts as closed."""
+VELOCITY_TOLERANCE = 1e-6
+"""Relative violation up to which declared velocities are taken as rounded and projected."""
+
+
+class Start(NamedTuple):
+    """The assembled start."""
+
+    q: np.ndarray
+    v: np.ndarray
+    active: np.ndarray
+    """Independent constraint rows."""
+    redundant: np.ndarray
+    """Rows that the others imply."""
+    singular_values: np.ndarray
+    """Of phi_q at the start, largest first."""
+    moved: float
+    """Largest change of a declared coordinate by assembly."""
+
+
+def assemble(model: Model) -> Start:
+    """Bring the declared start onto the constraints.
+
+    Raises:
+        AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint.
+    """
+    q, v = (x[: model.n_q].copy() for x in model.layout.start())
+    declared = q.copy()
+    q = _closed(model, q, model.layout.system.name)
+    active, redundant, singular_values = _rows(model, q)
+    v = _velocities(model, q, v)
+    _start_states(model, q, v)
+    return Start(q, v, active, redundant, singular_values, float(np.max(np.abs(q - declared))))
+
+
+def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
+    """Positions on phi = 0: Newton steps of least norm, shortened while |phi| does not fall."""
+    phi, _, G, _ = model.constraint_jacobian(q)
+    size = np.abs(phi).max(initial=0.0)
+    for _ in range(MAX_ITERATIONS):
+        if size < TOLERANCE:
+            break
+        step = np.linalg.lstsq(G, phi, rcond=1e-10)[0]
+        for shorter in 0.5 ** np.arange(8):
+            trial = q - shorter * step
+            phi_t, _, G_t, _ = model.constraint_jacobian(trial)
+            if np.abs(phi_t).max() < size:
+                break
+        else:
+            break
+        q, phi, G, size = trial, phi_t, G_t, np.abs(phi_t).max()
+    if size > ACCEPTED:
+        row = model.layout.row_names[int(np.argmax(np.abs(phi)))]
+        raise AssemblyError(
+            f"system '{name}' cannot be assembled: constraint '{row}' stays open by {size:.3g} (m or -) after least-squares "
+            "assembly. Check the lengths of that loop, or declare start poses nearer to the closed position."
+        )
+    return q
+
+
+def _rows(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Independent and redundant rows of phi_q; a row counts as redundant only if it is so in a second position too."""
+    if model.n_phi == 0:
+        none = np.zeros(0, int)
+        return none, none, np.zeros(0)
+    G = model.constraint_jacobian(q)[2]
+    active, redundant, singular_values, _ = independent_rows(G)
+    if len(redundant) == 0:
+        return active, redundant, singular_values
+    freedom = np.random.default_rng(0).normal(size=model.n_q)
+    freedom -= np.linalg.lstsq(G, G @ freedom, rcond=1e-10)[0]
+    if np.linalg.norm(freedom) > 1e-9:
+        try:
+            near = _closed(model, q + 1e-2 * freedom / np.linalg.norm(freedom), "near the start")
+        except AssemblyError:
+            return active, redundant, singular_values
+        other = independent_rows(model.constraint_jacobian(near)[2])
+        if len(other[0]) > len(active):
+            active, redundant = other[:2]
+    return active, redundant, singular_values
+
+
+def _velocities(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Velocities on phi_q v + phi_t = 0: drivers set them; a contradiction of declared ones is an error."""
+    _, phi_v, G, _ = model.constraint_jacobian(q, v)
+    _, phi_t, _, _ = model.constraint_jacobian(q, np.zeros_like(v))
+    correction = np.linalg.lstsq(G, phi_v, rcond=1e-10)[0] if model.n_phi else np.zeros_like(v)
+    size = np.abs(v).max(initial=0.0)
+    gap = np.abs(phi_v - phi_t)
+    if size > 0.0 and gap.max(initial=0.0) > VELOCITY_TOLERANCE * size and not np.any(phi_t):
+        row = int(np.argmax(gap))
+        worst = int(np.argmax(np.abs(correction)))
+        raise AssemblyError(
+            f"the declared velocities are inconsistent: constraint '{model.layout.row_names[row]}' would open at "
+            f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{model.layout.names[worst]}' from "
+            f"{v[worst]:.6g} to {v[worst] - correction[worst]:.6g}; declare velocities of all bodies of that loop together."
+        )
+    return v - correction
+
+
+def _start_states(model: Model, q: np.ndarray, v: np.ndarray) -> None:
+    """Let elements set their own coordinates from the assembled positions (fibres in equilibrium, PID states)."""
+    w = model.new_work()
+    signals, packed = Packed(model._signals), Packed(w)
+    evaluate_inputs(signals.table, 0.0, False, packed.table)
+    w.q[: model.n_q], w.v[: model.n_q] = q, v
+    for call in model.layout.dynamics:
+        hook = getattr(call.element, "start_states", None)
+        if hook is None:
+            continue
+        own = model.layout.offset[call.element.name]
+        for k, (value, rate) in enumerate(hook(model.layout.system, w.q[call.iq], w.u[call.iu])):
+            q[own + k], v[own + k] = value, rate
+            w.q[own + k], w.v[own + k] = value, rate

@@ -1,0 +1,115 @@
+"""Accelerations, multipliers and first-order rates that belong to given q and v: the right-hand limit at a start.
+
+    r2(q, v, vdot, lam) = 0,    phi_q vdot + (phi_q v)_q v + phi_tt = 0
+
+solved for vdot of second-order coordinates, v of first-order ones, and lam. Rigid bodies enter linearly; the fibres'
+force-velocity curve makes it a Newton iteration, halved whenever the residual grows.
+"""
+
+import math
+
+from numba import njit
+
+from dms_core.assembly.arena import flags, floats, indices, inner, ints
+from dms_core.assembly.residual import WORK, evaluate_rates
+from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.state import FACTORISATIONS, MODEL, STALE, STATE
+
+MAX_ITERATIONS = 60
+TOLERANCE = 1e-11
+"""Relative size of the last correction: the problem is solved to rounding, since all that follows builds on it."""
+
+
+@njit(cache=True, error_model="numpy")
+def _change(m, s, share):
+    """Add a share of the correction to the unknowns; gives the largest relative correction."""
+    w, second, active = inner(s, STATE.w), flags(m, MODEL.second), indices(m, MODEL.active)
+    scale, x = floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
+    v, a, lam = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
+    n, largest = second.shape[0], 0.0
+    for i in range(n):
+        change = share * x[i]
+        if second[i]:
+            a[i] += change
+            size = abs(change) / (1.0 + abs(a[i]))
+        else:
+            v[i] += change
+            size = abs(change) / (scale[i] + abs(v[i]))
+        if not size < math.inf:
+            return math.inf
+        largest = max(largest, size)
+    for k in range(active.shape[0]):
+        lam[active[k]] += share * x[n + k]
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def _correct(m, s):
+    """Newton correction at the present unknowns; False if the matrix is singular."""
+    w, active = inner(s, STATE.w), indices(m, MODEL.active)
+    b, x, values, work = (
+        floats(s, STATE.rate_b), floats(s, STATE.rate_x), floats(s, STATE.rate_values), floats(s, STATE.rate_work),
+    )  # fmt: skip
+    evaluate_rates(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.rates), w, values)
+    r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
+    n = b.shape[0] - active.shape[0]
+    for i in range(n):
+        b[i] = -r2[i]
+    for k in range(active.shape[0]):
+        b[n + k] = -phi_a[active[k]]
+    ints(s, STATE.count)[FACTORISATIONS] += 1
+    if not factorise(m, MODEL.rate_lu, values, work) > 0.0:
+        return False
+    back_substitute(m, MODEL.rate_lu, values, b, x, work)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _iterate(m, s):
+    """Newton's method for the rates, from the present guess; False if it does not converge."""
+    second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
+    share, before = 1.0, math.inf
+    for _ in range(MAX_ITERATIONS):
+        if not _correct(m, s):
+            return False
+        largest = 0.0
+        for i in range(second.shape[0]):
+            if not second[i]:
+                largest = max(largest, abs(x[i]) / scale[i])
+        # Only first-order rates are nonlinear; where their corrections grow, shorten them.
+        share = 0.5 * share if largest > 2.0 * before else min(1.0, 2.0 * share)
+        before = largest
+        change = _change(m, s, share)
+        if not change < math.inf:
+            return False
+        if change < TOLERANCE:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def consistent_rates(m, s):
+    """Fill v (first-order), qd, vd, lam of the state at its q, v and the inputs in w.u; False on failure."""
+    w, second = inner(s, STATE.w), flags(m, MODEL.second)
+    q, v, qd, vd, lam = (
+        floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd), floats(s, STATE.lam),
+    )  # fmt: skip
+    q_w, v_w, a_w, lam_w, mu_w = (
+        floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam), floats(w, WORK.mu),
+    )  # fmt: skip
+    for i in range(q.shape[0]):
+        q_w[i], v_w[i] = q[i], v[i]
+        a_w[i] = vd[i] if second[i] else 0.0
+    for k in range(lam.shape[0]):
+        lam_w[k], mu_w[k] = lam[k], 0.0
+    if not _iterate(m, s):
+        return False
+    lam_before, mu = floats(s, STATE.lam_before), floats(s, STATE.mu)
+    for i in range(q.shape[0]):
+        v[i] = qd[i] = v_w[i]
+        vd[i] = a_w[i] if second[i] else 0.0
+    for k in range(lam.shape[0]):
+        lam[k] = lam_before[k] = lam_w[k]
+        mu[k] = 0.0
+    ints(s, STATE.count)[STALE] = 1
+    return True

@@ -1,0 +1,201 @@
+"""Newton's method with line search for one stage of the implicit method (paper sect. 2.3).
+
+The stage is qdot = c0 q + cq, vdot = c0 v + cv in the residual of eq. 2. The factorised matrix is kept while the
+iteration contracts; corrections of a step that does not reduce the simplified Newton correction are halved
+(natural monotonicity test: Deuflhard 2011, sect. 3.3), which is a line search in an affine-invariant norm.
+"""
+
+import math
+
+from numba import njit
+
+from dms_core.assembly.arena import floats, indices, inner, ints
+from dms_core.assembly.residual import WORK, evaluate_constraints, evaluate_newton, evaluate_residual
+from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.state import (
+    AGE,
+    C0_FACTORED,
+    CONTRACTION,
+    FACTORISATIONS,
+    ITERATIONS,
+    MODEL,
+    MU,
+    PHI,
+    PHI_V,
+    STALE,
+    STATE,
+)
+
+CONVERGED, STALE_MATRIX, DIVERGED, SINGULAR, NOT_FINITE = range(5)
+MAX_ITERATIONS = 10
+MAX_HALVINGS = 5
+SLOW = 0.4
+"""Contraction above which an old matrix is not worth keeping."""
+C0_CHANGE = 0.3
+"""Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
+
+
+@njit(cache=True, error_model="numpy")
+def set_rates(s, c0):
+    """vdot = c0 v + cv at the present iterate."""
+    w, cv = inner(s, STATE.w), floats(s, STATE.cv)
+    a, v = floats(w, WORK.a), floats(w, WORK.v)
+    for i in range(cv.shape[0]):
+        a[i] = c0 * v[i] + cv[i]
+
+
+@njit(cache=True, error_model="numpy")
+def right_hand_side(m, s, c0):
+    """b = -(r1 / c0, r2 / c0^2, r3, r4 / c0), from the evaluated residual."""
+    w, active, b, cq = inner(s, STATE.w), indices(m, MODEL.active), floats(s, STATE.b), floats(s, STATE.cq)
+    q, v, gmu, r2 = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.gmu), floats(w, WORK.r2)
+    phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
+    n, k, h = cq.shape[0], active.shape[0], 1.0 / c0
+    for i in range(n):
+        b[i] = -h * (v[i] - c0 * q[i] - cq[i] - gmu[i])
+        b[n + i] = -h * h * r2[i]
+    for i in range(k):
+        b[2 * n + i] = -phi[active[i]]
+        b[2 * n + k + i] = -h * phi_v[active[i]]
+
+
+@njit(cache=True, error_model="numpy")
+def apply(m, s, c0, x, factor):
+    """Add factor times the scaled correction x to q, v, lam, mu."""
+    w, active = inner(s, STATE.w), indices(m, MODEL.active)
+    q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
+    n, k = floats(s, STATE.q).shape[0], active.shape[0]
+    for i in range(n):
+        q[i] += factor * x[i]
+        v[i] += factor * c0 * x[n + i]
+    for i in range(k):
+        lam[active[i]] += factor * c0 * c0 * x[2 * n + i]
+        mu[active[i]] += factor * c0 * x[2 * n + k + i]
+    set_rates(s, c0)
+
+
+@njit(cache=True, error_model="numpy")
+def correction_norm(s, c0):
+    """Largest weighted component of the correction x in q and v, inf if any is not finite."""
+    x, wq, wv = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv)
+    n, largest = wq.shape[0], 0.0
+    for i in range(n):
+        size = max(abs(x[i]) / wq[i], abs(c0 * x[n + i]) / wv[i])
+        if not size < math.inf:
+            return math.inf
+        largest = max(largest, size)
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def refresh(m, s, c0):
+    """Evaluate residual and matrix here and factorise; False if the matrix is singular."""
+    values, count = floats(s, STATE.newton_values), ints(s, STATE.count)
+    evaluate_newton(
+        inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.newton), inner(s, STATE.w), c0, values
+    )
+    count[FACTORISATIONS] += 1
+    count[STALE] = 0
+    count[AGE] = 0
+    floats(s, STATE.clock)[C0_FACTORED] = c0
+    return factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work)) > 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def correction(m, s, c0):
+    """Newton correction x at the present iterate, with the matrix at hand; gives its norm."""
+    right_hand_side(m, s, c0)
+    back_substitute(
+        m, MODEL.newton_lu, floats(s, STATE.newton_values), floats(s, STATE.b), floats(s, STATE.x), floats(s, STATE.newton_work)
+    )
+    ints(s, STATE.count)[ITERATIONS] += 1
+    return correction_norm(s, c0)
+
+
+@njit(cache=True, error_model="numpy")
+def largest_errors(s):
+    """Largest |phi| and |phi_q v + phi_t| of the last evaluation, over all rows, redundant ones included."""
+    w = inner(s, STATE.w)
+    phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
+    largest, largest_v = 0.0, 0.0
+    for k in range(phi.shape[0]):
+        largest = max(largest, abs(phi[k]))
+        largest_v = max(largest_v, abs(phi_v[k]))
+    return largest, largest_v
+
+
+@njit(cache=True, error_model="numpy")
+def note_errors(s):
+    """Keep the largest constraint errors and |mu| of the run."""
+    largest, mu = floats(s, STATE.largest), floats(inner(s, STATE.w), WORK.mu)
+    phi, phi_v = largest_errors(s)
+    largest[PHI] = max(largest[PHI], phi)
+    largest[PHI_V] = max(largest[PHI_V], phi_v)
+    for k in range(mu.shape[0]):
+        largest[MU] = max(largest[MU], abs(mu[k]))
+
+
+@njit(cache=True, error_model="numpy")
+def line_search(m, s, c0, before):
+    """Halve the last correction until the simplified one shrinks; gives its norm, inf when it never does."""
+    share = 1.0
+    for _ in range(MAX_HALVINGS):
+        share *= 0.5
+        apply(m, s, c0, floats(s, STATE.x_before), -share)
+        evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w))
+        norm = correction(m, s, c0)
+        if norm < before:
+            return norm
+    return math.inf
+
+
+@njit(cache=True, error_model="numpy")
+def constraints_hold(m, s, o, c0):
+    """True if the present iterate satisfies phi and phi_q v to the tolerance; velocities are of size c0 times positions."""
+    evaluate_constraints(inner(m, MODEL.constraints), inner(s, STATE.w))
+    phi, phi_v = largest_errors(s)
+    return phi <= o.constraint_tol and phi_v <= o.constraint_tol * max(1.0, 1e-3 * c0)
+
+
+@njit(cache=True, error_model="numpy")
+def newton(m, s, o, c0):
+    """Solve the stage from the guess in w. Gives (code, iterations).
+
+    STALE_MATRIX asks the caller to put the guess back and to call again with count[STALE] = 1.
+    """
+    clock, count, x, x_before = floats(s, STATE.clock), ints(s, STATE.count), floats(s, STATE.x), floats(s, STATE.x_before)
+    dynamics, constraints, w = inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w)
+    set_rates(s, c0)
+    fresh = count[STALE] == 1 or abs(c0 / clock[C0_FACTORED] - 1.0) > C0_CHANGE
+    if fresh:
+        if not refresh(m, s, c0):
+            return SINGULAR, 0
+    else:
+        evaluate_residual(dynamics, constraints, w)
+    contraction, before = clock[CONTRACTION], 0.0
+    for k in range(MAX_ITERATIONS):
+        norm = correction(m, s, c0)
+        if not norm < math.inf:
+            return (NOT_FINITE if fresh else STALE_MATRIX), k
+        if k > 0:
+            if norm > before and norm > o.newton_tol:
+                if not fresh:
+                    return STALE_MATRIX, k
+                norm = line_search(m, s, c0, before)
+                if not norm < math.inf:
+                    return DIVERGED, k
+            contraction = min(norm / before, 0.99) if before > 0.0 else 0.0
+        apply(m, s, c0, x, 1.0)
+        # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
+        left = norm * contraction / (1.0 - contraction) if k > 0 else 3.0 * norm * max(contraction, 0.05)
+        if left < o.newton_tol and constraints_hold(m, s, o, c0):
+            clock[CONTRACTION] = contraction
+            if contraction > SLOW:
+                count[STALE] = 1
+            return CONVERGED, k + 1
+        if k >= 3 and not fresh and contraction > SLOW:
+            return STALE_MATRIX, k
+        x_before[:] = x
+        before = norm
+        evaluate_residual(dynamics, constraints, w)
+    return (DIVERGED if fresh else STALE_MATRIX), MAX_ITERATIONS

@@ -1,0 +1,115 @@
+"""What the solver carries: constant tables of a model, mutable state of one world, options of a run."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dms_core.assembly.arena import Packed, fields
+from dms_core.assembly.arena import Packed, fields
+from dms_core.assembly.sparsity import NewtonPattern, RatePattern
+from dms_core.assembly.tables import Calls, Signals, Work
+from dms_core.linear.lu import LuTables, storage
+from dms_core.linear.lu import LuTables, storage
+
+# Entries of State.clock [s, unless said].
+T, H, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION = range(7)
+# Entries of State.count.
+(STEPS, REJECTED_ERROR, REJECTED_NEWTON, ITERATIONS, FACTORISATIONS, RESTARTS,
+ RESTART, STALE, AGE, WORST_ROW) = range(10)  # fmt: skip
+# Entries of State.largest.
+PHI, PHI_V, MU, H_LEAST, H_MOST = range(5)
+
+
+class Tables(NamedTuple):
+    """Constants of a compiled model."""
+
+    dynamics: Calls
+    constraints: Calls
+    sensors: Calls
+    newton: NewtonPattern
+    newton_lu: LuTables
+    rates: RatePattern
+    rate_lu: LuTables
+    active: np.ndarray
+    """Constraint rows that are solved for, (n_active,)."""
+    second: np.ndarray
+    """True for second-order coordinates, whose vdot appears in their row, (n_q,)."""
+    scale_q: np.ndarray
+    scale_v: np.ndarray
+
+
+class State(NamedTuple):
+    """One world. Vectors of the history have length n_q; w holds the values being solved for."""
+
+    w: Work
+    signals: Signals
+    clock: np.ndarray
+    count: np.ndarray
+    largest: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    qd: np.ndarray
+    """d q/dt of the method at the last accepted time."""
+    vd: np.ndarray
+    lam: np.ndarray
+    mu: np.ndarray
+    q_before: np.ndarray
+    v_before: np.ndarray
+    lam_before: np.ndarray
+    cq: np.ndarray
+    """qdot = c0 q + cq in the step being solved."""
+    cv: np.ndarray
+    q_guess: np.ndarray
+    v_guess: np.ndarray
+    wq: np.ndarray
+    """Error weights of q: atol + rtol |q|."""
+    wv: np.ndarray
+    newton_values: np.ndarray
+    newton_work: np.ndarray
+    b: np.ndarray
+    x: np.ndarray
+    x_before: np.ndarray
+    rate_values: np.ndarray
+    rate_work: np.ndarray
+    rate_b: np.ndarray
+    rate_x: np.ndarray
+
+
+class Options(NamedTuple):
+    """Numbers that steer a run, as compiled code sees them; see dynamics.SolverOptions."""
+
+    rtol: float
+    atol: float
+    """Absolute tolerance of every variable; 0 takes rtol times the nominal size of each."""
+    fixed_step: float
+    """Step [s]; 0 for error control."""
+    h_max: float
+    h_min: float
+    newton_tol: float
+    constraint_tol: float
+    max_steps: int
+
+
+MODEL, STATE = fields(Tables), fields(State)
+
+
+MODEL, STATE = fields(Tables), fields(State)
+
+
+def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.ndarray) -> Packed:
+    """A world at its start: q and v of shape (n_q,)."""
+    n, m = len(tables.second), len(w.lam)
+    size, rate_size = 2 * n + 2 * len(tables.active), n + len(tables.active)
+    zeros = np.zeros
+    w.q[:n], w.v[:n] = q, v
+    count = zeros(10, np.int64)
+    count[RESTART] = count[STALE] = 1
+    return Packed(State(
+        w, signals, zeros(7), count, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
+        q.copy(), v.copy(), v.copy(), zeros(n), zeros(m), zeros(m), q.copy(), v.copy(), zeros(m),
+        *(zeros(n) for _ in range(6)),
+        storage(tables.newton_lu.size), storage(tables.newton_lu.work_size), zeros(size), zeros(size), zeros(size),
+        storage(tables.rate_lu.size), storage(tables.rate_lu.work_size), zeros(rate_size), zeros(rate_size),
+    ))  # fmt: skip

@@ -1,0 +1,213 @@
+"""The loop over steps: size, acceptance, jumps of the inputs, recording.
+
+The next size is 0.9 err^(-1/3) h (order 2), lowered when Newton needed many iterations (paper sect. 2.3; the formula
+is that of Hairer and Wanner 1996, IV.8), and left alone when it would change by less than a fifth: an unchanged step
+keeps the factorised matrix good.
+"""
+
+import math
+
+from numba import njit
+
+from dms_core.assembly.arena import floats, inner, ints
+from dms_core.assembly.residual import SIGNALS, WORK, evaluate_inputs
+from dms_core.simulation.bdf2 import GAMMA, bdf2_step, set_weights, start_step
+from dms_core.simulation.initial_rates import consistent_rates
+from dms_core.simulation.newton import CONVERGED, MAX_ITERATIONS, SINGULAR, note_errors
+from dms_core.simulation.state import (
+    H_BEFORE,
+    H_BEFORE2,
+    H_LEAST,
+    H_MOST,
+    H_WANTED,
+    REJECTED_ERROR,
+    REJECTED_NEWTON,
+    RESTART,
+    RESTARTS,
+    STALE,
+    STATE,
+    STEPS,
+    T,
+)
+
+# Codes of `advance`; results.Result gives each its sentence.
+DONE, BUFFER_FULL, STEP_TOO_SMALL, NEWTON_FAILED, MATRIX_SINGULAR, TOO_MANY_STEPS, RATES_FAILED = range(7)
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
+DEAD_ZONE = 1.2
+
+
+@njit(cache=True, error_model="numpy")
+def next_stop(s, t_end):
+    """The next time a step must end on: a jump of an input or the end."""
+    t, jumps = floats(s, STATE.clock)[T], floats(inner(s, STATE.signals), SIGNALS.jumps)
+    for k in range(jumps.shape[0]):
+        if jumps[k] > t:
+            return min(t_end, jumps[k])
+    return t_end
+
+
+@njit(cache=True, error_model="numpy")
+def first_step(s, o):
+    """A careful first size: accelerations move no coordinate by more than a tenth of its weight."""
+    vd, wq, fastest = floats(s, STATE.vd), floats(s, STATE.wq), 0.0
+    for i in range(wq.shape[0]):
+        fastest = max(fastest, abs(vd[i]) / wq[i])
+    return min(math.sqrt(0.2 / fastest), o.h_max) if fastest > 0.0 else o.h_max
+
+
+@njit(cache=True, error_model="numpy")
+def record_point(s, record, k):
+    """Row k of the record: t, q, v, vdot, lam, mu."""
+    q, v, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.vd)
+    lam, mu = floats(s, STATE.lam), floats(s, STATE.mu)
+    n, m = q.shape[0], lam.shape[0]
+    record[k, 0] = floats(s, STATE.clock)[T]
+    for i in range(n):
+        record[k, 1 + i] = q[i]
+        record[k, 1 + n + i] = v[i]
+        record[k, 1 + 2 * n + i] = vd[i]
+    for i in range(m):
+        record[k, 1 + 3 * n + i] = lam[i]
+        record[k, 1 + 3 * n + m + i] = mu[i]
+
+
+@njit(cache=True, error_model="numpy")
+def accept(s, h, c0, started):
+    """Take over the solved step: history, derivatives of the method, clock."""
+    w, clock, largest = inner(s, STATE.w), floats(s, STATE.clock), floats(s, STATE.largest)
+    q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
+    q_before, v_before, cq, cv = (
+        floats(s, STATE.q_before), floats(s, STATE.v_before), floats(s, STATE.cq), floats(s, STATE.cv),
+    )  # fmt: skip
+    q_new, v_new = floats(w, WORK.q), floats(w, WORK.v)
+    for i in range(q.shape[0]):
+        q_before[i], v_before[i] = q[i], v[i]
+        q[i], v[i] = q_new[i], v_new[i]
+        qd[i] = c0 * q[i] + cq[i]
+        vd[i] = c0 * v[i] + cv[i]
+    lam, mu, lam_before = floats(s, STATE.lam), floats(s, STATE.mu), floats(s, STATE.lam_before)
+    lam_new, mu_new = floats(w, WORK.lam), floats(w, WORK.mu)
+    for k in range(lam.shape[0]):
+        lam_before[k] = lam[k]
+        lam[k], mu[k] = lam_new[k], mu_new[k]
+    clock[T] += h
+    clock[H_BEFORE2] = 0.0 if started else clock[H_BEFORE]
+    clock[H_BEFORE] = h
+    largest[H_LEAST] = min(largest[H_LEAST], h)
+    largest[H_MOST] = max(largest[H_MOST], h)
+    ints(s, STATE.count)[STEPS] += 1
+    ints(s, STATE.count)[RESTART] = 0
+
+
+@njit(cache=True, error_model="numpy")
+def restart(m, s, o):
+    """Values just behind a jump: inputs from the right, consistent rates and multipliers; False if there are none."""
+    clock = floats(s, STATE.clock)
+    evaluate_inputs(inner(s, STATE.signals), clock[T], False, inner(s, STATE.w))
+    ints(s, STATE.count)[RESTARTS] += 1
+    if not consistent_rates(m, s):
+        return False
+    set_weights(m, s, o)
+    if clock[H_WANTED] <= 0.0:
+        clock[H_WANTED] = first_step(s, o)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def landing_size(h, rest, fixed):
+    """h shortened so that a step ends after `rest`, without leaving a sliver for the one after."""
+    if h >= rest * (1.0 - 1e-9):
+        return rest
+    return 0.5 * rest if h > 0.55 * rest and not fixed else h
+
+
+@njit(cache=True, error_model="numpy")
+def try_step(m, s, o, h, started):
+    """One attempt; gives (code, iterations per stage, error, c0)."""
+    if started:
+        code, iterations, error = start_step(m, s, o, h)
+        return code, 0.5 * iterations, error, 1.0 / (GAMMA * h)
+    ratio = h / floats(s, STATE.clock)[H_BEFORE]
+    code, iterations, error = bdf2_step(m, s, o, h)
+    return code, 1.0 * iterations, error, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h
+
+
+@njit(cache=True, error_model="numpy")
+def resize(h, error, iterations):
+    """The next step size from the error and the Newton count."""
+    effort = (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
+    factor = GROW if error <= 0.0 else SAFETY * effort * error ** (-1.0 / 3.0)
+    factor = min(GROW, max(SHRINK, factor))
+    return h if 1.0 <= factor < DEAD_ZONE else h * factor
+
+
+@njit(cache=True, error_model="numpy")
+def one_step(m, s, o, stop):
+    """Attempts until one step is accepted; gives DONE or what went wrong."""
+    clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.count), o.fixed_step > 0.0
+    started = count[RESTART] == 1
+    set_weights(m, s, o)
+    wanted = o.fixed_step if fixed else min(clock[H_WANTED], o.h_max)
+    if not started and not fixed:
+        wanted = min(wanted, GROW * clock[H_BEFORE])
+    rest = stop - clock[T]
+    first_try = True
+    while True:
+        h = landing_size(wanted, rest, fixed)
+        code, iterations, error, c0 = try_step(m, s, o, h, started)
+        if code == SINGULAR:
+            return MATRIX_SINGULAR
+        if code == CONVERGED and (error <= 1.0 or fixed):
+            break
+        if code == CONVERGED:
+            count[REJECTED_ERROR] += 1
+            wanted = h * max(SHRINK, min(0.9, SAFETY * error ** (-1.0 / 3.0)))
+        else:
+            count[REJECTED_NEWTON] += 1
+            count[STALE] = 1
+            wanted = 0.25 * h
+        first_try = False
+        if fixed or wanted < o.h_min:
+            return STEP_TOO_SMALL if code == CONVERGED else NEWTON_FAILED
+    note_errors(s)
+    accept(s, h, c0, started)
+    if h == rest:
+        land(s, stop)
+    if not fixed:
+        size = resize(h, error, iterations)
+        # A step cut short by a landing says little about the size that the motion allows.
+        clock[H_WANTED] = max(size, wanted) if h < wanted and first_try else size
+    return DONE
+
+
+@njit(cache=True, error_model="numpy")
+def land(s, stop):
+    """Set the clock exactly; behind a jump of an input the method starts afresh."""
+    floats(s, STATE.clock)[T] = stop
+    jumps = floats(inner(s, STATE.signals), SIGNALS.jumps)
+    for k in range(jumps.shape[0]):
+        if jumps[k] == stop:
+            ints(s, STATE.count)[RESTART] = 1
+
+
+@njit(cache=True, error_model="numpy")
+def advance(m, s, o, t_end, record, recorded):
+    """Step until t_end; gives (code, number of rows recorded). BUFFER_FULL asks to be called again with room."""
+    clock, count = floats(s, STATE.clock), ints(s, STATE.count)
+    while clock[T] < t_end:
+        if recorded + 2 > record.shape[0]:
+            return BUFFER_FULL, recorded
+        if count[STEPS] >= o.max_steps:
+            return TOO_MANY_STEPS, recorded
+        if count[RESTART] == 1:
+            if not restart(m, s, o):
+                return RATES_FAILED, recorded
+            record_point(s, record, recorded)
+            recorded += 1
+        code = one_step(m, s, o, next_stop(s, t_end))
+        if code != DONE:
+            return code, recorded
+        record_point(s, record, recorded)
+        recorded += 1
+    return DONE, recorded
