@@ -9,6 +9,8 @@ wish must not reach psidot. The command that actuators read is ki q_c + kp v_c +
 
 e is integrated, not measured: with drift_gain k_d = 0, as in the paper, v_c may leave e by the error of integration;
 k_d > 0 [1/s] pulls it back with time constant 1 / k_d (Baumgarte 1972) and changes nothing on the exact solution.
+k_d may be far above 1 / h, since the implicit method damps stiff decay: 1e3 to 1e4 cost no steps. On the pendulum of
+the tests, 1.8 s at rtol 1e-5, the drift is 8e-5 rad with k_d = 0, 8e-7 with 1e3 and 8e-8 with 1e4.
 
 Start: q_c = 0, v_c = e(0). theta is the principal value in (-pi, pi], which e(0) and the drift term use; without
 drift feedback a joint may turn further, since only theta_q enters.
