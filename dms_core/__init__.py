@@ -13,11 +13,15 @@ Letters, as in the paper (SI units, radians):
     Ls        tendon slack length                              p         Euler parameters, scalar first
 """
 
-from dms_core.assembly.model import Model
-from dms_core.errors import AssemblyError, DmsError, InputError, ModelError, SimulationError
-from dms_core.model.system import System
-from dms_core.results import Result, SolveStats, States, Trajectory
-from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate
+from dms_core.compilation import drop_stale_code
+
+drop_stale_code()
+
+from dms_core.assembly.model import Model  # noqa: E402
+from dms_core.errors import AssemblyError, DmsError, InputError, ModelError, SimulationError  # noqa: E402
+from dms_core.model.system import System  # noqa: E402
+from dms_core.results import Result, SolveStats, States, Trajectory  # noqa: E402
+from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate  # noqa: E402
 
 __all__ = [
     "AssemblyError",

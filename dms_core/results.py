@@ -12,6 +12,7 @@ from dms_core.errors import DmsError, SimulationError, choices
 
 if TYPE_CHECKING:
     from dms_core.assembly.model import Model
+    from dms_core.assembly.tables import Signals
 
 
 class Result(Enum):
@@ -69,9 +70,11 @@ class Trajectory:
         stats: counts and worst errors.
     """
 
-    def __init__(self, model: Model, record: np.ndarray, result: Result, stats: SolveStats, message: str) -> None:
+    def __init__(
+        self, model: Model, signals: Signals, record: np.ndarray, result: Result, stats: SolveStats, message: str
+    ) -> None:
         n, m = model.n_q, model.n_phi
-        self.model = model
+        self.model, self.signals = model, signals
         self.t = record[:, 0].copy()
         self.q, self.v, self.a = (record[:, 1 + k * n : 1 + (k + 1) * n].copy() for k in range(3))
         self.lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
@@ -118,13 +121,13 @@ class Trajectory:
         q, slope_q, _ = _hermite(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
         v, slope_v, _ = _hermite(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
         line = lambda y: (1.0 - x) * y[start] + x * y[end]  # noqa: E731
-        return States(
-            self.model, times, q, np.where(second, v, slope_q), np.where(second, slope_v, 0.0), line(self.lam), line(self.mu)
-        )
+        v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
+        return States(self.model, self.signals, times, q, v, a, line(self.lam), line(self.mu))
 
     def own_steps(self) -> States:
         """States on the solver's own steps."""
-        return States(self.model, self.t, self.q, self.v, self.a, self.lam, self.mu, _behind_jumps(self.t))
+        behind = _behind_jumps(self.t)
+        return States(self.model, self.signals, self.t, self.q, self.v, self.a, self.lam, self.mu, behind)
 
     def sensors(self, times: Any = None) -> dict[str, np.ndarray]:
         """All sensors by name, on the solver's own steps or at the given times [s]."""
@@ -134,8 +137,8 @@ class Trajectory:
 class States:
     """States at given times, and what the model's sensors read there."""
 
-    def __init__(self, model: Model, t, q, v, a, lam, mu, behind=None) -> None:  # noqa: ANN001
-        self.model = model
+    def __init__(self, model: Model, signals: Signals, t, q, v, a, lam, mu, behind=None) -> None:  # noqa: ANN001
+        self.model, self.signals = model, signals
         self.t, self.q, self.v, self.a, self.lam, self.mu = t, q, v, a, lam, mu
         self.behind = np.zeros(len(t), bool) if behind is None else behind
 
@@ -155,7 +158,7 @@ class States:
 
     def sensors(self) -> dict[str, np.ndarray]:
         """Every component of every sensor by name, shape (k,) each."""
-        y = self.model.measure(self.t, self.q, self.v, self.a, self.lam, self.behind)
+        y = self.model.measure(self.signals, self.t, self.q, self.v, self.a, self.lam, self.behind)
         return {name: y[:, k] for k, (name, _) in enumerate(self.model.layout.outputs)}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from dms_core.assembly.residual import dense_constraints, evaluate_inputs, evalu
 from dms_core.assembly.sensing import Partials, composition, evaluate_partials, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
 from dms_core.assembly.tables import Signals, Work, all_calls, new_work, signal_tables
+from dms_core.compilation import announce
 from dms_core.errors import AssemblyError, ModelError
 from dms_core.linear.ordering import SingularMatrixError
-from dms_core.linear.rank import minimum_norm
+from dms_core.linear.rank import independent_rows, minimum_norm
 from dms_core.linear.symbolic import LuTables, plan
 from dms_core.model.system import System
 from dms_core.simulation.initial_conditions import Start, assemble
@@ -33,7 +34,6 @@ class LinearSystem:
     rows: np.ndarray
     columns: np.ndarray
     names: list[str]
-    values: np.ndarray = field(init=False)
 
     def ordered(self, values: np.ndarray) -> tuple[Any, LuTables]:
         """(scatter into the LU, LU tables) for an elimination order chosen by these values.
@@ -64,6 +64,7 @@ class Model:
     """
 
     def __init__(self, system: System) -> None:
+        announce()
         self.system = system
         self.layout = layout = Layout(system)
         self.n_q, self.n_phi = layout.n_q, layout.n_phi
@@ -71,7 +72,7 @@ class Model:
         self._signals, self._keep_alive = signal_tables(layout)
         self.second_order = np.array([c.differential_rate for c in layout.coordinates])
         self.start: Start = assemble(self)
-        self._tables = Packed(self._order())
+        self._tables = Packed(self._order(self.start.active, self.start.q, self.start.v, 0.0))
         self._composed = Packed(composition(layout))
         self._sensor_work = Packed(self.new_work())
 
@@ -104,13 +105,23 @@ class Model:
         """Constant tables (a packed Tables) for the compiled solver."""
         return self._tables
 
-    def _order(self) -> Tables:
-        """Elimination orders of both linear systems, from their values at the start."""
-        layout, active = self.layout, self.start.active.astype(np.int32)
+    def reordered(self, q: np.ndarray, v: np.ndarray, t: float) -> Packed:
+        """Tables with independent rows and elimination orders chosen anew at q, v [shape (n_q,)], for a run that needs them.
+
+        Raises:
+            ModelError: the equations are singular there.
+        """
+        G = self.constraint_jacobian(q, v, t)[2]
+        active = independent_rows(G).independent
+        return Packed(self._order(active if len(active) >= len(self.start.active) else self.start.active, q, v, t))
+
+    def _order(self, active: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) -> Tables:
+        """Scatter and elimination orders of both linear systems, from their values at q, v."""
+        layout, active = self.layout, active.astype(np.int32)
         work = self.new_work()
-        work.q[: self.n_q], work.v[: self.n_q] = self.start.q, self.start.v
+        work.q[: self.n_q], work.v[: self.n_q] = q, v
         w, dynamics, constraints = Packed(work), self._dynamics.table, self._constraints.table
-        evaluate_inputs(Packed(self._signals).table, 0.0, False, w.table)
+        evaluate_inputs(Packed(self._signals).table, t, False, w.table)
         rows = [layout.row_names[k] for k in active]
         names = [*(f"{n} (position)" for n in layout.names), *(f"{n} (velocity)" for n in layout.names)]
         newton, slots = newton_pattern(layout, active)
@@ -156,12 +167,12 @@ class Model:
         for k in range(len(q)):
             lam[k] = minimum_norm(self.constraint_jacobian(q[k])[2], lam[k])
 
-    def measure(self, t, q, v, a, lam, behind, signals: Signals | None = None) -> np.ndarray:  # noqa: ANN001
-        """Sensors at given states: shape (k, n_y)."""
+    def measure(self, signals: Signals, t, q, v, a, lam, behind) -> np.ndarray:  # noqa: ANN001
+        """Sensors at given states with the given inputs: shape (k, n_y); behind[k] takes inputs behind a jump."""
         y = np.zeros((len(t), len(self.layout.outputs)))
         measure(
             self._dynamics.table, self._constraints.table, self._sensors.table, self._composed.table,
-            Packed(signals or self._signals).table, self._sensor_work.table, t, q, v, a, lam, behind, y,
+            Packed(signals).table, self._sensor_work.table, t, q, v, a, lam, behind, y,
         )  # fmt: skip
         return y
 

@@ -164,6 +164,21 @@ def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
     return Signals(np.array(kinds, np.int64), flat, c, ptr, np.array(addresses, np.int64), events), keep
 
 
+def with_settings(signals: Signals, settings: dict[int, list[tuple[float, float]]]) -> Signals:
+    """The same inputs, those that were set between calls as the steps they made: settings[k] = [(time [s], value), ...]."""
+    starts, coefficients = [], []
+    for k in range(len(signals.kind)):
+        t, c = (x[signals.ptr[k] : signals.ptr[k + 1]] for x in (signals.t, signals.c))
+        if k in settings:
+            t = np.array([time for time, _ in settings[k]])
+            c = np.zeros((len(t), 6))
+            c[:, 0] = [value for _, value in settings[k]]
+        starts.append(t)
+        coefficients.append(c)
+    flat, ptr = _flat(starts, np.float64)
+    return signals._replace(t=flat, ptr=ptr, c=np.ascontiguousarray(np.concatenate([np.zeros((0, 6)), *coefficients])))
+
+
 def new_work(layout: Layout) -> Work:
     """Fresh work arrays, the ground's coordinates in place."""
     calls = [*layout.dynamics, *layout.constraints, *layout.sensors]

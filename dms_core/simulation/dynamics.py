@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dms_core.assembly.arena import Packed
 from dms_core.assembly.model import Model
-from dms_core.errors import InputError, SimulationError
+from dms_core.assembly.tables import with_settings
+from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
@@ -30,6 +32,7 @@ from dms_core.simulation.state import (
     Options,
     State,
     T,
+    with_tables,
 )
 
 BUFFER_ROWS = 256
@@ -95,6 +98,7 @@ class Simulation:
         self.model = model if isinstance(model, Model) else Model(model)
         self.options = options or SolverOptions()
         self._numbers = self.options.numbers()
+        self._tables: Packed = self.model.tables
         self._world = self.model.new_state()
         self.state: State = self._world.values
         self._rows: list[np.ndarray] = []
@@ -133,20 +137,38 @@ class Simulation:
         """
         if not math.isfinite(t_end) or t_end < self.time:
             raise InputError(f"t_end = {t_end} s; a time not before the present {self.time:.6g} s is wanted.")
-        code = step_control.BUFFER_FULL
         try:
-            while code == step_control.BUFFER_FULL:
-                code, count = step_control.advance(
-                    self.model.tables.table, self._world.table, self._numbers, float(t_end), self._buffer, 0
-                )
-                self._rows.append(self._buffer[:count].copy())
-                if progress is not None:
-                    progress(self.time)
+            code = self._advance(float(t_end), progress)
+            if code == step_control.MATRIX_SINGULAR and self._reorder():
+                code = self._advance(float(t_end), progress)
         except KeyboardInterrupt:
             self.result = Result.INTERRUPTED
             return self.result
         self.result = _RESULTS.get(code, Result.SUCCESS)
         return self.result
+
+    def _advance(self, t_end: float, progress: Callable[[float], None] | None) -> int:
+        """Step until t_end, draining the record; gives the code of step_control."""
+        code = step_control.BUFFER_FULL
+        while code == step_control.BUFFER_FULL:
+            code, count = step_control.advance(
+                self._tables.table, self._world.table, self._numbers, t_end, self._buffer, 0
+            )
+            self._rows.append(self._buffer[:count].copy())
+            if progress is not None:
+                progress(self.time)
+        return code
+
+    def _reorder(self) -> bool:
+        """Choose rows and pivots anew where the old ones became singular; False if nothing helps."""
+        s = self.state
+        try:
+            self._tables = self.model.reordered(s.q, s.v, self.time)
+        except ModelError:
+            return False
+        self._world = with_tables(self._tables.values, s)
+        self.state = self._world.values
+        return True
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
@@ -164,9 +186,8 @@ class Simulation:
         message = self.result.value
         if self.result is not Result.SUCCESS:
             message = f"{message} Stopped at t = {self.time:.6g} s."
-        trajectory = Trajectory(self.model, np.concatenate(self._rows), self.result, self.stats(), message)
-        trajectory.settings = self._settings
-        return trajectory
+        signals = with_settings(self.state.signals, self._settings)
+        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), message)
 
 
 def simulate(

@@ -31,6 +31,8 @@ MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
 SLOW = 0.4
 """Contraction above which an old matrix is not worth keeping."""
+SINGULAR_PIVOT = 1e-14
+"""Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
 C0_CHANGE = 0.3
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
@@ -98,7 +100,7 @@ def refresh(m, s, c0):
     count[STALE] = 0
     count[AGE] = 0
     floats(s, STATE.clock)[C0_FACTORED] = c0
-    return factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work)) > 0.0
+    return factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work)) > SINGULAR_PIVOT
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,6 @@ from dms_core.assembly.arena import Packed, fields
 from dms_core.assembly.sparsity import NewtonPattern, RatePattern
 from dms_core.assembly.tables import Calls, Signals, Work
 from dms_core.linear.lu import LuTables, storage
-from dms_core.linear.lu import LuTables, storage
 
 # Entries of State.clock [s, unless said].
 T, H, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION = range(7)
@@ -98,10 +97,23 @@ MODEL, STATE = fields(Tables), fields(State)
 MODEL, STATE = fields(Tables), fields(State)
 
 
+def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
+    """Storage of both linear systems."""
+    n, k = len(tables.second), len(tables.active)
+    newton, rates = tables.newton_lu, tables.rate_lu
+    return {
+        "newton_values": storage(newton.size),
+        "newton_work": storage(newton.work_size),
+        **{name: np.zeros(2 * n + 2 * k) for name in ("b", "x", "x_before")},
+        "rate_values": storage(rates.size),
+        "rate_work": storage(rates.work_size),
+        **{name: np.zeros(n + k) for name in ("rate_b", "rate_x")},
+    }
+
+
 def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.ndarray) -> Packed:
     """A world at its start: q and v of shape (n_q,)."""
     n, m = len(tables.second), len(w.lam)
-    size, rate_size = 2 * n + 2 * len(tables.active), n + len(tables.active)
     zeros = np.zeros
     w.q[:n], w.v[:n] = q, v
     count = zeros(10, np.int64)
@@ -109,7 +121,13 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
     return Packed(State(
         w, signals, zeros(7), count, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
         q.copy(), v.copy(), v.copy(), zeros(n), zeros(m), zeros(m), q.copy(), v.copy(), zeros(m),
-        *(zeros(n) for _ in range(6)),
-        storage(tables.newton_lu.size), storage(tables.newton_lu.work_size), zeros(size), zeros(size), zeros(size),
-        storage(tables.rate_lu.size), storage(tables.rate_lu.work_size), zeros(rate_size), zeros(rate_size),
+        *(zeros(n) for _ in range(6)), **_linear_arrays(tables),
     ))  # fmt: skip
+
+
+def with_tables(tables: Tables, state: State) -> Packed:
+    """The same world for other rows and elimination orders: it starts afresh with least-norm multipliers unknown."""
+    state.count[RESTART] = state.count[STALE] = 1
+    state.lam[:], state.mu[:] = 0.0, 0.0
+    state.w.lam[:], state.w.mu[:] = 0.0, 0.0
+    return Packed(state._replace(**_linear_arrays(tables)))
