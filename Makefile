@@ -1,0 +1,53 @@
+# Two commands for a stranger: `make demo` and `make test`. Needs Python 3.11 or later, make and pip; no root.
+# PYTHON chooses the interpreter of a new .venv:  make demo PYTHON=python3.12
+PYTHON ?= python3
+OUT ?= out/scenarios
+WORKERS ?= 2
+
+BIN := .venv/bin
+STAMP := .venv/installed
+
+.PHONY: help demo test bench lint format docs clean
+
+help:
+	@echo "make demo   the four scenarios of the paper, with figures, into $(OUT)"
+	@echo "make test   the tests"
+	@echo "make bench  speed, as a table"
+	@echo "make lint   ruff and mypy"
+	@echo "make format rewrite the sources in the project's layout"
+	@echo "make docs   generate docs/model-files.md from the code"
+	@echo "make clean  remove .venv, out, build products and compiled kernels"
+
+# Made again when it is missing or when the dependencies change.
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	    echo "$(PYTHON) is $$($(PYTHON) --version); Python 3.11 or later is needed: make ... PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[pictures,dev]"
+	@touch $@
+
+demo: $(STAMP)
+	$(BIN)/python -m exo_env scenarios --out $(OUT)
+	@echo "Figures, tables and scenarios.json are in $(CURDIR)/$(OUT)"
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+bench: $(STAMP)
+	$(BIN)/python tests/benchmarks/bench.py
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+docs: $(STAMP)
+	$(BIN)/python -m dms_core schema --out docs/model-files.md
+
+clean:
+	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
