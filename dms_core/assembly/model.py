@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,9 @@ from dms_core.simulation.state import Tables, new_state
 
 TYPICAL_C0 = 1.5e3
 """c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen."""
+
+NEARBY_STATES, NEARBY = 6, 0.1
+"""States, and their distance in nominal sizes, over which an entry must keep its size to become a pivot."""
 
 
 @dataclass
@@ -125,20 +129,42 @@ class Model:
         rows = [layout.row_names[k] for k in active]
         names = [*(f"{n} (position)" for n in layout.names), *(f"{n} (velocity)" for n in layout.names)]
         newton, slots = newton_pattern(layout, active)
-        values, packed = np.zeros(len(slots.number)), Packed(newton)
-        evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, values)
+        packed = Packed(newton)
+        values = self._lasting_values(
+            work, len(slots.number), lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x)
+        )
         newton, newton_lu = LinearSystem(
             newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
         ).ordered(values)
         rates, slots = rate_pattern(layout, active)
-        values, packed = np.zeros(len(slots.number)), Packed(rates)
-        evaluate_rates(dynamics, constraints, packed.table, w.table, values)
+        packed_rates = Packed(rates)
+        values = self._lasting_values(
+            work, len(slots.number), lambda x: evaluate_rates(dynamics, constraints, packed_rates.table, w.table, x)
+        )
         rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*layout.names, *rows]).ordered(values)
         scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
         return Tables(
             self._dynamics.values, self._constraints.values, self._sensors.values, newton, newton_lu, rates, rate_lu, active,
             self.second_order, np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1]),
         )  # fmt: skip
+
+    def _lasting_values(self, work: Work, size: int, evaluate: Callable[[np.ndarray], None]) -> np.ndarray:
+        """Matrix entries at the state in `work`, those that can vanish made small: the least size over nearby states.
+
+        An entry that is large at the start and zero later (a saturated command, a slack tendon) must not become a pivot.
+        """
+        scales = np.array([(c.scale, c.rate_scale) for c in self.layout.coordinates])
+        q, v, rng = work.q.copy(), work.v.copy(), np.random.default_rng(0)
+        values, trial = np.zeros(size), np.zeros(size)
+        evaluate(values)
+        sizes = np.abs(values)
+        for _ in range(NEARBY_STATES):
+            work.q[: self.n_q] = q[: self.n_q] + NEARBY * scales[:, 0] * rng.normal(size=self.n_q)
+            work.v[: self.n_q] = v[: self.n_q] + scales[:, 1] * rng.normal(size=self.n_q)
+            evaluate(trial)
+            sizes = np.where(np.isfinite(trial), np.minimum(sizes, np.abs(trial)), sizes)
+        work.q[:], work.v[:] = q, v
+        return np.copysign(sizes, values)
 
     def input_index(self, name: str) -> int:
         """Index of an input; an unknown name is an error that lists the inputs."""
