@@ -41,7 +41,7 @@ import numpy as np
 from numba import float64, int32, int64, types
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from dms_core.errors import ModelError, choices
+from dms_core.errors import DmsError, ModelError, choices
 
 _I = types.Array(int32, 1, "C")
 _A = types.Array(float64, 1, "C")
@@ -129,16 +129,22 @@ class Declaration(BaseModel):
 def explain(cls: type[BaseModel], data: dict[str, Any], error: ValidationError) -> str:
     """One sentence per mistake: which element, which key, what value, what would be right."""
     label = getattr(cls, "kind", "") or cls.__name__
-    who = f"{label} '{data.get('name', '?')}'"
+    who = f"{label} '{data.get('name', '?')}'" if "name" in cls.model_fields else label
     lines = []
     for e in error.errors():
-        key = ".".join(str(x) for x in e["loc"]) or "declaration"
+        key = ".".join(str(x) for x in e["loc"])
+        right = e["msg"].removeprefix("Value error, ").removeprefix("Input ").rstrip(".")
         if e["type"] == "extra_forbidden":
             lines.append(f"{who}: unknown key '{key}'. Allowed: {choices(cls.model_fields)}.")
         elif e["type"] == "missing":
             lines.append(f"{who}: '{key}' is missing.")
+        elif not key:
+            lines.append(f"{who}: {right}.")
+        elif isinstance(e.get("ctx", {}).get("error"), DmsError):
+            # A part with checks of its own (a path point, a signal) has named key and value already.
+            lines.append(f"{who}: {key}: {right}.")
         else:
-            lines.append(f"{who}: {key} = {e['input']!r}: {e['msg'].removeprefix('Value error, ')}.")
+            lines.append(f"{who}: {key} = {e['input']!r}: {right}.")
     return "\n".join(lines)
 
 
