@@ -19,7 +19,7 @@ from dms_core.model.constraints import (
     Slider,
     Spherical,
 )
-from dms_core.model.control import Pid, ReferenceFilter, RopeActuator
+from dms_core.model.control import DelayedError, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
 from dms_core.model.forces import FirstOrder, Gravity, JointSpringDamper, LumpedLoad, SecondOrder, SpringDamper
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
@@ -35,6 +35,7 @@ __all__ = [
     "AngleDriver",
     "Constant",
     "CoordinateSensor",
+    "DelayedError",
     "Distance",
     "EulerNorm",
     "FirstOrder",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.control.actuator import RopeActuator
+from dms_core.model.control.delayed_error import DelayedError
 from dms_core.model.control.pid import Pid
 from dms_core.model.control.reference_filter import ReferenceFilter
 from dms_core.model.element import GROUND
@@ -59,6 +60,19 @@ def pid_both() -> Example:
     return Example(controlled(_filter(), pid), pid)
 
 
+def delayed_chain() -> Example:
+    """Three lags behind an input."""
+    element = DelayedError(name="reflex", joint="hinge", reference="psi", delay=0.06)
+    return Example(controlled(element), element)
+
+
+def delayed_once() -> Example:
+    """One lag, own pointers, the joint on the ground."""
+    pointers = {"pointer_i": (1.0, 0.0, 0.2), "pointer_j": (1.0, 0.3, 0.1)}
+    element = DelayedError(name="reflex", joint="hinge", reference="psi", delay=0.06, lags=1, **pointers)
+    return Example(controlled(element, body_i=GROUND), element)
+
+
 def reference_filter() -> Example:
     """Off resonance and underdamped."""
     element = _filter()
@@ -99,6 +113,7 @@ def actuator_limit() -> Example:
 
 
 EXAMPLES = {
+    "delayed_error": (delayed_chain, delayed_once),
     "pid": (pid_plain, pid_filtered, pid_both),
     "reference_filter": (reference_filter,),
     "rope_actuator": (actuator_input, actuator_linear, actuator_blend, actuator_limit),

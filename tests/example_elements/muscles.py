@@ -9,6 +9,7 @@ metres (then in the toe), or metres too long (then slack).
 from __future__ import annotations
 
 from dms_core.model.element import GROUND
+from dms_core.model.forces.first_order import FirstOrder
 from dms_core.model.muscles.muscle import ThelenMuscle
 from dms_core.model.muscles.thelen_curves import ThelenCurves
 from dms_core.model.ropes.path import PathPoint
@@ -95,6 +96,24 @@ def activation_given() -> Example:
     return _example(muscle, **_moving(muscle, (1.05, 1.4), (-0.2, -0.02)))
 
 
+def _reflex(level: Range) -> Example:
+    """An excitation of 0.3 and a reflex of 0.8 times a coordinate."""
+    muscle = _muscle(reflex="reflex.x", reflex_gain=0.8)
+    system = pair(forces=[FirstOrder(name="reflex", time_constant=0.1), muscle], inputs=["command"])
+    ranges = _moving(muscle, (0.6, 0.95), (-0.2, -0.02), activation=(0.1, 0.2), command=(0.3, 0.35))
+    return Example(system, muscle, **{**ranges, "q": {**ranges["q"], "reflex.x": level}})
+
+
+def reflex_rising() -> Example:
+    """Excitation and reflex inside the limits."""
+    return _reflex((0.1, 0.5))
+
+
+def reflex_limited() -> Example:
+    """The reflex silences the muscle."""
+    return _reflex((-3.0, -1.0))
+
+
 def sensor() -> Example:
     """All components, with activation dynamics."""
     muscle, sensor = _muscle(), MuscleSensor(name="probe", muscle="biceps", components=tuple(UNITS))
@@ -125,6 +144,8 @@ EXAMPLES = {
         fast_lengthening,
         steep_pennation,
         activation_given,
+        reflex_rising,
+        reflex_limited,
     ),
     "muscle_sensor": (sensor, sensor_activation_given, sensor_steep),
 }

@@ -8,6 +8,8 @@ Fibre length q_m [m] and activation a [-] are coordinates of the system:
 
     sigma = F0 ft(e),   e = l_T / Ls - 1,   l_T = l(q) - q_m cos(alpha),   sin(alpha) = L0 sin(alpha0) / q_m
 
+u is an input, or an input plus gain x, where x is a coordinate of another element (a reflex): u = u(t) + gain q_x.
+
 The fibre's height L0 sin(alpha0) is constant; cos(alpha) is not let below 0.1. With the force-velocity curve inverted
 in closed form the fibre row holds q_m and its rate directly, without an inner iteration.
 """
@@ -44,12 +46,14 @@ from dms_core.model.ropes.path import (
 
 LEAST_COSINE = 0.1
 """Pennation is not let beyond acos(0.1), about 84 degrees."""
-PATH_NUMBERS = 14
-"""Index in `par` where the path begins; before it F0, L0, Ls, height, vmax [m/s], tau_act, tau_deact, then the seven
-numbers of the curves."""
+PATH_NUMBERS = 15
+"""Index in `par` where the path begins; before it F0, L0, Ls, height, vmax [m/s], tau_act, tau_deact, the seven
+numbers of the curves, then the reflex gain."""
+REFLEX_GAIN = 14
+"""Index of the reflex gain in `par`; 0 without a reflex."""
 PATH_INTEGERS = 2
-"""Index in `ip` where the path begins: before it, 1 for activation dynamics (0 where the input is the activation), and
-the number m of body coordinates: q_m is local coordinate m, a is m + 1."""
+"""Index in `ip` where the path begins: before it, 1 for activation dynamics (2 with a reflex, 0 where the input is the
+activation), and the number m of body coordinates: q_m is local coordinate m, a is m + 1, a reflex m + 2."""
 
 
 @njit(cache=True)
@@ -70,6 +74,15 @@ def muscle_activation(ip, q, u):
     if ip[0] > 0:
         return q[ip[1] + 1], 0.0
     return limited(u[0, 0])
+
+
+@njit(cache=True)
+def muscle_excitation(ip, par, q, u):
+    """(excitation [-], its derivative by the reflex coordinate)."""
+    if ip[0] < 2:
+        return limited(u[0, 0])[0], 0.0
+    e, inside = limited(u[0, 0] + par[REFLEX_GAIN] * q[ip[1] + 2])
+    return e, inside * par[REFLEX_GAIN]
 
 
 @njit(cache=True)
@@ -123,11 +136,14 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         r[i] *= sigma
     r[m] = (active + passive) * c - sigma
     if ip[0] > 0:
-        rate, rate_a, _ = activation_rate(act, limited(u[0, 0])[0], par[5], par[6])
+        excitation, by_reflex = muscle_excitation(ip, par, q, u)
+        rate, rate_a, rate_u = activation_rate(act, excitation, par[5], par[6])
         r[m + 1] = v[m + 1] - rate
         if level > 0:
             Jq[m + 1, m + 1] = -rate_a
             Jv[m + 1, m + 1] = 1.0
+            if ip[0] > 1:
+                Jq[m + 1, m + 2] = -rate_u * by_reflex
 
 
 class ThelenMuscle(Force):
@@ -152,6 +168,11 @@ class ThelenMuscle(Force):
     deactivation_time_constant: float = Field(default=0.050, gt=0.0, description="tau_deact, falling activation [s]")
     curves: ThelenCurves = Field(default=ThelenCurves(), description="shapes of the force curves")
     activation_dynamics: bool = Field(default=True, description="False: the input is the activation, without delay")
+    reflex: str | None = Field(
+        default=None,
+        description="coordinate x of another element, for example 'feedback.error', that adds reflex_gain x to the excitation",
+    )
+    reflex_gain: float = Field(default=0.0, description="excitation per unit of the reflex coordinate [-]")
     start_activation: float = Field(
         default=MINIMUM,
         ge=MINIMUM,
@@ -170,6 +191,14 @@ class ThelenMuscle(Force):
             raise ValueError(
                 f"pennation_angle = {self.pennation_angle} rad; it must be below {math.acos(LEAST_COSINE):.4f} rad"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _reflex_possible(self):
+        if self.reflex is None and self.reflex_gain != 0.0:
+            raise ValueError(f"reflex_gain = {self.reflex_gain} without a reflex; name the coordinate it multiplies")
+        if self.reflex is not None and not self.activation_dynamics:
+            raise ValueError(f"reflex '{self.reflex}' acts on the excitation; it needs activation_dynamics: true")
         return self
 
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -191,11 +220,12 @@ class ThelenMuscle(Force):
         """Bodies that the path crosses between, then the muscle's own coordinates."""
         table = path_table(system, self.path)
         names = tuple(f"{self.name}.{c.name}" for c in self.coordinates())
+        names += () if self.reflex is None else (self.reflex,)
         return Placement(
             bodies=table.bodies,
             coordinates=names,
             inputs=(self.excitation,),
-            integers=(int(self.activation_dynamics), table.size, *table.integers),
+            integers=(int(self.activation_dynamics) + int(self.reflex is not None), table.size, *table.integers),
             numbers=(*self.numbers(), *table.numbers),
             pattern=self._pattern(table, table.size + len(names)),
         )
@@ -212,6 +242,7 @@ class ThelenMuscle(Force):
             self.activation_time_constant,
             self.deactivation_time_constant,
             *self.curves.numbers(),
+            self.reflex_gain,
         )
 
     @staticmethod
@@ -220,8 +251,10 @@ class ThelenMuscle(Force):
         m = table.size
         by_q, by_v = path_pattern(table, n), np.zeros((n, n), bool)
         by_q[: m + 1, : m + 1] = True
-        by_q[m, m:] = True
-        by_q[range(m, n), range(m, n)] = by_v[range(m, n), range(m, n)] = True
+        by_q[m, m : m + 2] = True
+        own = range(m, min(n, m + 2))
+        by_q[own, own] = by_v[own, own] = True
+        by_q[m + 1 : m + 2, m + 2 :] = True
         return Pattern(by_q, by_v, np.zeros((n, n), bool))
 
     def tension(self, length_mt: float, fibre_length: float) -> float:
@@ -261,7 +294,8 @@ class ThelenMuscle(Force):
 
         Args:
             system: the declared system.
-            q: local coordinates of the placement at the assembled start, shape (n,); only those of bodies are read.
+            q: local coordinates of the placement at the assembled start, shape (n,); those of bodies and the reflex
+                are read.
             u: (value, rate, second derivative) of the excitation at the start, shape (1, 3).
 
         Returns:
@@ -273,7 +307,8 @@ class ThelenMuscle(Force):
         """
         table = path_table(system, self.path)
         length = path_length(np.array(table.integers, np.int32), 0, np.array(table.numbers), 0, np.asarray(q, float))
-        excitation = limited(float(u[0, 0]))[0]
+        reflex = 0.0 if self.reflex is None else self.reflex_gain * float(q[table.size + 2])
+        excitation = limited(float(u[0, 0]) + reflex)[0]
         a = self.start_activation if self.activation_dynamics else excitation
         fibre = (self.start_fibre_length or self.equilibrium(length, a), 0.0)
         if not self.activation_dynamics:
