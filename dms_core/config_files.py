@@ -19,7 +19,9 @@ def configs() -> Path:
     for place in places:
         if place.is_dir():
             return place
-    raise InputError(f"the configuration folder is missing: looked for {' and '.join(map(str, places))}. Reinstall exo-env.")
+    raise InputError(
+        f"the configuration folder is missing: looked for {' and '.join(map(str, places))}. Reinstall exo-env."
+    )
 
 
 def config_file(name: str) -> Path:

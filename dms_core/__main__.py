@@ -1,0 +1,181 @@
+"""Command line of the DMS platform: check, run and describe model files.
+
+python -m dms_core check MODEL.yaml
+python -m dms_core run MODEL.yaml --t-end T --rtol R [--sample DT] --out FILE.csv [--stats FILE.json]
+python -m dms_core schema [--out FILE]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from tqdm import tqdm
+from tyro.conf import Positional, arg
+
+from dms_core import Model, Simulation, SolverOptions, Trajectory
+from dms_core.errors import DmsError, InputError
+from dms_core.model_file import load
+from dms_core.output_file import check_writable, whole_file, with_unit, write_csv, write_json
+from dms_core.results import States
+from dms_core.schema import reference
+
+LONG_RUN = 2.0
+"""Seconds after which a run shows a progress bar."""
+
+USER_MISTAKE, FAILED_RUN = 2, 1
+"""Exit statuses."""
+
+
+def check(model: Positional[Path]) -> int:
+    """Print what a model file declares: bodies, coordinates, rows, rank, degrees of freedom, redundant rows.
+
+    Args:
+        model: model file (YAML).
+    """
+    print(report(Model(load(model))))
+    return 0
+
+
+def report(model: Model) -> str:
+    """What `check` prints."""
+    system, start = model.system, model.start
+    bodies = [f"  {b.name} ({b.kind})" for b in system.bodies] or ["  none"]
+    smallest = f"{start.singular_values.min():.3g}" if len(start.singular_values) else "none"
+    independent = start.singular_values[: len(start.active)]
+    lines = [
+        f"system '{system.name}'",
+        f"bodies: {len(system.bodies)}",
+        *bodies,
+        f"coordinates: {model.n_q}",
+        f"constraint rows: {model.n_phi}",
+        f"rank: {len(model.active_rows)}",
+        f"degrees of freedom: {model.degrees_of_freedom}",
+        f"redundant rows: {', '.join(model.redundant_rows) or 'none'}",
+        f"smallest singular value of phi_q: {smallest}",
+    ]
+    if model.redundant_rows and len(independent):
+        lines.append(f"smallest one without the redundant rows: {independent.min():.3g}")
+    lines += [
+        f"forces: {len(system.forces)}, sensors: {len(model.layout.outputs)} components, inputs: {len(system.inputs)}",
+        f"assembly moved the declared start by at most {start.moved:.3g} (m or -)",
+    ]
+    return "\n".join(lines)
+
+
+def run(
+    model: Positional[Path],
+    t_end: float,
+    out: Path,
+    rtol: float = SolverOptions.rtol,
+    sample: float | None = None,
+    stats: Path | None = None,
+    step: float | None = None,
+) -> int:
+    """Run a model file from its assembled start and write sensors, coordinates and rates as CSV.
+
+    Without --sample the rows are the solver's own steps; at a jump of an input a time stands twice, with the values
+    before and behind it. A run that stops early writes what it has and ends with status 1.
+
+    Args:
+        model: model file (YAML).
+        t_end: end time [s].
+        out: CSV file to write; its folder is made where it is missing.
+        rtol: relative tolerance of the error per step.
+        sample: time between rows [s]; default: the solver's own steps.
+        stats: JSON file for the solver's statistics.
+        step: constant step [s] instead of error control.
+    """
+    if not (np.isfinite(t_end) and t_end > 0.0):
+        raise InputError(f"--t-end {t_end}: a positive time [s] is wanted.")
+    if sample is not None and not (np.isfinite(sample) and sample > 0.0):
+        raise InputError(f"--sample {sample}: a positive time [s] is wanted.")
+    options = SolverOptions(rtol=rtol, fixed_step=step)
+    for path in (out, stats):
+        if path is not None:
+            check_writable(path)
+    simulation = Simulation(Model(load(model)), options)
+    with tqdm(total=t_end, unit="s", delay=LONG_RUN, leave=False, disable=None, bar_format=BAR) as bar:
+        simulation.advance(t_end, _moves(bar))
+    trajectory = simulation.trajectory()
+    write_csv(out, table(trajectory, sample))
+    summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
+    if stats is not None:
+        write_json(stats, summary)
+    for key, value in summary.items():
+        print(
+            f"{key.replace('_', ' ')}: {value:.4g}" if isinstance(value, float) else f"{key.replace('_', ' ')}: {value}"
+        )
+    print(f"written: {out}")
+    if not trajectory.success:
+        print(f"The run failed: {trajectory.message} '{out}' holds the part before.", file=sys.stderr)
+        return FAILED_RUN
+    return 0
+
+
+BAR = "{percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
+
+
+def _moves(bar: tqdm) -> Callable[[float], None]:
+    """Progress callback that moves the bar to the time reached."""
+
+    def progress(t: float) -> None:
+        bar.update(t - bar.n)
+
+    return progress
+
+
+def table(trajectory: Trajectory, sample: float | None) -> dict[str, np.ndarray]:
+    """Columns of a run: time, sensors with their unit, coordinates 'q.*' and their rates 'v.*'.
+
+    Args:
+        trajectory: a finished or interrupted run.
+        sample: time between rows [s]; None for the solver's own steps.
+    """
+    states = trajectory.own_steps()
+    if sample is not None and len(trajectory.t) > 1:
+        # A multiple of `sample` that rounding puts just behind the end still counts.
+        count = int(np.floor(trajectory.t[-1] / sample * (1.0 + 1e-12)))
+        states = trajectory.at(np.minimum(np.arange(count + 1) * sample, trajectory.t[-1]))
+    return columns(states)
+
+
+def columns(states: States) -> dict[str, np.ndarray]:
+    """Columns of given states."""
+    layout, measured = states.model.layout, states.sensors()
+    found = {"time_s": states.t}
+    found |= {with_unit(name, unit): measured[name] for name, unit in layout.outputs}
+    found |= {f"q.{name}": states.q[:, k] for k, name in enumerate(layout.names)}
+    return found | {f"v.{name}": states.v[:, k] for k, name in enumerate(layout.names)}
+
+
+def schema(out: Annotated[Path | None, arg(help="file to write; default: standard output")] = None) -> int:
+    """Print the reference of model files: every kind with its keys, units and defaults (Markdown)."""
+    if out is None:
+        print(reference(), end="")
+        return 0
+    with whole_file(out) as file:
+        file.write(reference())
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; a mistake of the user is one message on stderr and status 2."""
+    try:
+        return tyro.extras.subcommand_cli_from_dict(
+            {"check": check, "run": run, "schema": schema},
+            prog="python -m dms_core",
+            description="Check, run and describe models of multibody systems with ropes, muscles and controllers.",
+            args=arguments,
+        )
+    except DmsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return USER_MISTAKE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

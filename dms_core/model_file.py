@@ -1,0 +1,149 @@
+"""Model files: the declarations of `dms_core.model` as YAML, with the same keys, units, defaults and checks.
+
+    name: pendulum
+    bodies:
+      - {kind: rigid_body, name: rod, mass: 1.0, inertia: [0.1, 0.001, 0.1], position: [0.5, 0.0, 0.0]}
+    constraints:
+      - {kind: revolute, name: hinge, body_j: rod}
+
+`kind` chooses the class; classes of other packages count as soon as they are imported. SI units and radians only.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel
+
+import dms_core.model  # noqa: F401  (makes every kind known)
+from dms_core.errors import DmsError, InputError, ModelError, choices
+from dms_core.model.constraints.euler_norm import EulerNorm
+from dms_core.model.element import Body, Constraint, Declaration, Force, Sensor
+from dms_core.model.signals import Function, Input
+from dms_core.model.system import System
+from dms_core.yaml_text import Section, read_yaml
+
+BRANCHES: dict[str, type[Declaration]] = {
+    "bodies": Body,
+    "constraints": Constraint,
+    "forces": Force,
+    "sensors": Sensor,
+    "inputs": Input,
+}
+"""Sections of a file and what stands in them."""
+
+
+def kinds(section: str) -> dict[str, type[Declaration]]:
+    """Kind to class of everything that may stand in a section, by kind.
+
+    Raises:
+        ModelError: two classes have the same kind.
+    """
+    found: dict[str, type[Declaration]] = {}
+    pending = [BRANCHES[section]]
+    while pending:
+        cls = pending.pop()
+        pending += cls.__subclasses__()
+        # The unit-norm equations come by themselves with the bodies.
+        if not cls.kind or cls is EulerNorm:
+            continue
+        other = found.setdefault(cls.kind, cls)
+        if other is not cls:
+            raise ModelError(
+                f"two classes are of kind '{cls.kind}': {other.__module__}.{other.__name__} and "
+                f"{cls.__module__}.{cls.__name__}; give one of them another kind."
+            )
+    return dict(sorted(found.items()))
+
+
+def load(path: str | Path) -> System:
+    """The system that a model file declares.
+
+    Raises:
+        InputError: the file cannot be read or is not YAML.
+        ModelError: a declaration is wrong; names file, line, element, key, value and what is right.
+    """
+    content = read_yaml(path)
+    unknown = content.keys() - BRANCHES.keys() - {"name"}
+    if unknown:
+        allowed = choices({"name", *BRANCHES})
+        raise ModelError(f"{path}: unknown key {_quoted(unknown)} at the top. Allowed: {allowed}.")
+    name = content.get("name", Path(path).stem)
+    if not isinstance(name, str):
+        raise ModelError(f"{path}: name = {name!r}: a text is wanted.")
+    sections = {section: _section(path, section, content.get(section)) for section in BRANCHES}
+    try:
+        return System(name, **sections)  # type: ignore[arg-type]
+    except DmsError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def _section(path: str | Path, section: str, items: Any) -> list[Declaration]:
+    """The declarations of one section."""
+    if items is None:
+        return []
+    if not isinstance(items, list):
+        raise ModelError(f"{path}: {section} = {items!r}: a list is wanted, each item beginning with '- '.")
+    return [_declaration(path, section, item) for item in items]
+
+
+def _declaration(path: str | Path, section: str, item: Any) -> Declaration:
+    """One item of a section as the class that its kind names."""
+    if not isinstance(item, Section):
+        raise ModelError(f"{path}: {section}: {item!r} is not a mapping with the keys 'kind' and 'name'.")
+    where, data = f"{path}, line {item.line}", dict(item)
+    who = f"'{data.get('name', '?')}' in {section}"
+    # Only one class may stand among the inputs.
+    kind = data.pop("kind", "input" if section == "inputs" else None)
+    allowed = kinds(section)
+    if kind is None:
+        raise ModelError(f"{where}: {who}: 'kind' is missing. Kinds of {section}: {choices(allowed)}.")
+    if kind not in allowed:
+        others = [s for s in BRANCHES if kind in kinds(s)]
+        hint = f" It belongs under '{others[0]}'." if others else ""
+        raise ModelError(f"{where}: {who}: unknown kind {kind!r}.{hint} Kinds of {section}: {choices(allowed)}.")
+    try:
+        declaration = allowed[kind](**data)
+    except DmsError as error:
+        raise ModelError(f"{where}: {error}") from None
+    if isinstance(declaration, Input) and isinstance(declaration.signal, Function):
+        raise ModelError(f"{where}: {who}: a signal of kind 'function' is Python code; declare it in Python.")
+    return declaration
+
+
+def dump(system: System) -> str:
+    """The model file of a system: `load` of it gives equal declarations. Values that are defaults are left out.
+
+    Raises:
+        InputError: an input is a Python function, which no file can hold.
+    """
+    content: dict[str, Any] = {"name": system.name}
+    for section in BRANCHES:
+        declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm)]
+        if declared:
+            content[section] = [_plain(e) for e in declared]
+    return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
+
+
+def _plain(value: Any) -> Any:
+    """A declaration, or a value in it, as mappings, lists and scalars."""
+    if isinstance(value, Function):
+        raise InputError("a signal of kind 'function' is Python code; a model file cannot hold it.")
+    if isinstance(value, BaseModel):
+        kind = getattr(value, "kind", None)
+        plain = {} if kind is None or isinstance(value, Input) else {"kind": kind}
+        for key, field in type(value).model_fields.items():
+            item = getattr(value, key)
+            if key != "kind" and (field.is_required() or item != field.get_default(call_default_factory=True)):
+                plain[key] = _plain(item)
+        return plain
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _quoted(names: Any) -> str:
+    """Names in quotes, sorted."""
+    return ", ".join(f"'{name}'" for name in sorted(names))
