@@ -12,10 +12,11 @@ import hashlib
 import sys
 from pathlib import Path
 
+from numba.core import event
+from numba.core.caching import NullCache
+
 PACKAGE = Path(__file__).parent
 STAMP = PACKAGE / "__pycache__" / "compiled_sources.sha256"
-SEEN = "step_control.advance"
-"""The last function that a first run compiles: where its machine code is on disk, so is the rest."""
 
 
 def fingerprint() -> str:
@@ -41,17 +42,32 @@ def drop_stale_code() -> None:
         STAMP.write_text(now)
 
 
-def is_cold() -> bool:
-    """True if a run will have to compile first."""
-    return not any((PACKAGE / "simulation" / "__pycache__").glob(f"{SEEN}*.nbi"))
+class _Announcer(event.Listener):
+    """Says once, on stderr, that code is being compiled: numba itself tells, so nothing is said from a warm cache."""
+
+    def __init__(self) -> None:
+        self.silent = False
+
+    def on_start(self, event: event.Event) -> None:
+        """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""
+        if not self.silent and not isinstance(event.data["dispatcher"]._cache, NullCache):
+            self.silent = True
+            print(
+                "dms_core: compiling to machine code, kept on disk (the very first run takes about half a minute) ...",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    def on_end(self, event: event.Event) -> None:
+        """Nothing to say."""
 
 
-_announced = False
+_announcer: _Announcer | None = None
 
 
 def announce() -> None:
-    """Say once, on stderr, that the first run compiles."""
-    global _announced
-    if not _announced and is_cold():
-        print("dms_core: first use, compiling to machine code (about half a minute, kept on disk) ...", file=sys.stderr)
-    _announced = True
+    """From now on, say once on stderr when something has to be compiled."""
+    global _announcer
+    if _announcer is None:
+        _announcer = _Announcer()
+        event.register("numba:compile", _announcer)
