@@ -45,8 +45,8 @@ def report(model: Model) -> str:
     """What `check` prints."""
     system, start = model.system, model.start
     bodies = [f"  {b.name} ({b.kind})" for b in system.bodies] or ["  none"]
-    smallest = f"{start.singular_values.min():.3g}" if len(start.singular_values) else "none"
     independent = start.singular_values[: len(start.active)]
+    smallest = f"{independent.min():.3g}" if len(independent) else "no rows"
     lines = [
         f"system '{system.name}'",
         f"bodies: {len(system.bodies)}",
@@ -56,11 +56,7 @@ def report(model: Model) -> str:
         f"rank: {len(model.active_rows)}",
         f"degrees of freedom: {model.degrees_of_freedom}",
         f"redundant rows: {', '.join(model.redundant_rows) or 'none'}",
-        f"smallest singular value of phi_q: {smallest}",
-    ]
-    if model.redundant_rows and len(independent):
-        lines.append(f"smallest one without the redundant rows: {independent.min():.3g}")
-    lines += [
+        f"smallest singular value of phi_q within its rank: {smallest}",
         f"forces: {len(system.forces)}, sensors: {len(model.layout.outputs)} components, inputs: {len(system.inputs)}",
         f"assembly moved the declared start by at most {start.moved:.3g} (m or -)",
     ]

@@ -16,6 +16,8 @@ from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
 from dms_core.assembly.tables import Signals, Work, all_calls, new_work, signal_tables
 from dms_core.compilation import announce
 from dms_core.errors import AssemblyError, ModelError
+from dms_core.linear.lu import assemble as assemble_lu
+from dms_core.linear.lu import factor, storage
 from dms_core.linear.ordering import SingularMatrixError
 from dms_core.linear.rank import independent_rows, minimum_norm
 from dms_core.linear.symbolic import LuTables, plan
@@ -27,7 +29,10 @@ TYPICAL_C0 = 1.5e3
 """c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen."""
 
 NEARBY_STATES, NEARBY = 6, 0.1
-"""States, and their distance in nominal sizes, over which an entry must keep its size to become a pivot."""
+"""Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
+
+GOOD_PIVOT = 1e-6
+"""Smallest relative pivot with which no other order is tried: ten digits are left."""
 
 
 @dataclass
@@ -54,6 +59,40 @@ class LinearSystem:
                 "free direction, or an element whose row does not contain its own coordinate."
             ) from error
         return moved(self.pattern, lu.position), lu
+
+    def best_order(self, samples: list[np.ndarray]) -> tuple[Any, LuTables]:
+        """As `ordered`, with the order whose smallest relative pivot over all samples is the largest.
+
+        An entry that is large at the start and zero later (a saturated command, a slack tendon) must not become a
+        pivot. The first order tried is that of the least sizes over the samples; they are no matrix that occurs, and
+        rows of it may cancel where the real ones do not, hence the test on real values and the other candidates.
+
+        Args:
+            samples: entries at the start, then at nearby states.
+        """
+        least = np.copysign(np.min(np.abs(samples), axis=0), samples[0])
+        best, found, problem = -1.0, None, None
+        for values in (least, *samples):
+            try:
+                candidate = self.ordered(values)
+            except ModelError as error:
+                problem = error
+                continue
+            smallest = min(_smallest_pivot(candidate[1], x) for x in samples)
+            if smallest > best:
+                best, found = smallest, candidate
+            if best > GOOD_PIVOT:
+                break
+        if found is None:
+            raise problem  # type: ignore[misc]
+        return found
+
+
+def _smallest_pivot(lu: LuTables, values: np.ndarray) -> float:
+    """Of a factorisation of these entries in that order, relative to its row."""
+    a = storage(lu.size)
+    assemble_lu(lu, values, a)
+    return factor(lu, a, storage(lu.work_size))[0]
 
 
 class Model:
@@ -130,41 +169,41 @@ class Model:
         names = [*(f"{n} (position)" for n in layout.names), *(f"{n} (velocity)" for n in layout.names)]
         newton, slots = newton_pattern(layout, active)
         packed = Packed(newton)
-        values = self._lasting_values(
-            work, len(slots.number), lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x)
-        )
         newton, newton_lu = LinearSystem(
             newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
-        ).ordered(values)
+        ).best_order(
+            self._samples(
+                work, len(slots.number), lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x)
+            )
+        )
         rates, slots = rate_pattern(layout, active)
         packed_rates = Packed(rates)
-        values = self._lasting_values(
-            work, len(slots.number), lambda x: evaluate_rates(dynamics, constraints, packed_rates.table, w.table, x)
+        rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*layout.names, *rows]).best_order(
+            self._samples(
+                work, len(slots.number), lambda x: evaluate_rates(dynamics, constraints, packed_rates.table, w.table, x)
+            )
         )
-        rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*layout.names, *rows]).ordered(values)
         scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
         return Tables(
             self._dynamics.values, self._constraints.values, self._sensors.values, newton, newton_lu, rates, rate_lu, active,
             self.second_order, np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1]),
         )  # fmt: skip
 
-    def _lasting_values(self, work: Work, size: int, evaluate: Callable[[np.ndarray], None]) -> np.ndarray:
-        """Matrix entries at the state in `work`, those that can vanish made small: the least size over nearby states.
-
-        An entry that is large at the start and zero later (a saturated command, a slack tendon) must not become a pivot.
-        """
+    def _samples(self, work: Work, size: int, evaluate: Callable[[np.ndarray], None]) -> list[np.ndarray]:
+        """Matrix entries at the state in `work` and at nearby ones, where they are finite."""
         scales = np.array([(c.scale, c.rate_scale) for c in self.layout.coordinates])
         q, v, rng = work.q.copy(), work.v.copy(), np.random.default_rng(0)
-        values, trial = np.zeros(size), np.zeros(size)
-        evaluate(values)
-        sizes = np.abs(values)
-        for _ in range(NEARBY_STATES):
-            work.q[: self.n_q] = q[: self.n_q] + NEARBY * scales[:, 0] * rng.normal(size=self.n_q)
-            work.v[: self.n_q] = v[: self.n_q] + scales[:, 1] * rng.normal(size=self.n_q)
-            evaluate(trial)
-            sizes = np.where(np.isfinite(trial), np.minimum(sizes, np.abs(trial)), sizes)
+        samples = []
+        for k in range(1 + NEARBY_STATES):
+            values = np.zeros(size)
+            if k > 0:
+                work.q[: self.n_q] = q[: self.n_q] + NEARBY * scales[:, 0] * rng.normal(size=self.n_q)
+                work.v[: self.n_q] = v[: self.n_q] + scales[:, 1] * rng.normal(size=self.n_q)
+            evaluate(values)
+            if k == 0 or np.isfinite(values).all():
+                samples.append(values)
         work.q[:], work.v[:] = q, v
-        return np.copysign(sizes, values)
+        return samples
 
     def input_index(self, name: str) -> int:
         """Index of an input; an unknown name is an error that lists the inputs."""

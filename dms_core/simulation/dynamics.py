@@ -61,7 +61,7 @@ class SolverOptions:
     """Largest step [s]."""
     h_min: float = 1e-12
     """Step below which a run gives up [s]."""
-    newton_tol: float = 0.03
+    newton_tol: float = 0.05
     """Largest error left by Newton's method, in units of the tolerance [-]."""
     constraint_tol: float = 1e-10
     """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s]."""

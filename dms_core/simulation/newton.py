@@ -29,11 +29,12 @@ from dms_core.simulation.state import (
 CONVERGED, STALE_MATRIX, DIVERGED, SINGULAR, NOT_FINITE = range(5)
 MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
-SLOW = 0.4
+MAX_CLOSINGS = 6
+SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping."""
 SINGULAR_PIVOT = 1e-14
 """Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
-C0_CHANGE = 0.3
+C0_CHANGE = 0.1
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
 
@@ -152,11 +153,28 @@ def line_search(m, s, c0, before):
 
 
 @njit(cache=True, error_model="numpy")
-def constraints_hold(m, s, o, c0):
-    """True if the present iterate satisfies phi and phi_q v to the tolerance; velocities are of size c0 times positions."""
-    evaluate_constraints(inner(m, MODEL.constraints), inner(s, STATE.w))
-    phi, phi_v = largest_errors(s)
-    return phi <= o.constraint_tol and phi_v <= o.constraint_tol * max(1.0, 1e-3 * c0)
+def close_constraints(m, s, o, c0):
+    """Bring phi and phi_q v below their tolerance with corrections that leave r1 and r2 alone; False if they resist.
+
+    Newton's test looks at the tolerance of the run; constraints are to hold much better. Their rows alone are evaluated
+    and solved for with the matrix at hand, at a third of the cost of a full iteration. Velocities are of the size of c0
+    times positions, and so is their tolerance.
+    """
+    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), indices(m, MODEL.active)
+    phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
+    n, k = floats(s, STATE.q).shape[0], active.shape[0]
+    for _ in range(MAX_CLOSINGS):
+        evaluate_constraints(inner(m, MODEL.constraints), w)
+        error, error_v = largest_errors(s)
+        if error <= o.constraint_tol and error_v <= o.constraint_tol * max(1.0, 1e-3 * c0):
+            return True
+        b[: 2 * n] = 0.0
+        for i in range(k):
+            b[2 * n + i] = -phi[active[i]]
+            b[2 * n + k + i] = -phi_v[active[i]] / c0
+        back_substitute(m, MODEL.newton_lu, floats(s, STATE.newton_values), b, x, floats(s, STATE.newton_work))
+        apply(m, s, c0, x, 1.0)
+    return False
 
 
 @njit(cache=True, error_model="numpy")
@@ -190,7 +208,7 @@ def newton(m, s, o, c0):
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
         left = norm * contraction / (1.0 - contraction) if k > 0 else 3.0 * norm * max(contraction, 0.05)
-        if left < o.newton_tol and constraints_hold(m, s, o, c0):
+        if left < o.newton_tol and close_constraints(m, s, o, c0):
             clock[CONTRACTION] = contraction
             if contraction > SLOW:
                 count[STALE] = 1
