@@ -15,7 +15,7 @@ from dms_core.assembly.sensing import Partials, composition, evaluate_partials, 
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
 from dms_core.assembly.tables import Signals, Work, all_calls, new_work, signal_tables
 from dms_core.compilation import announce
-from dms_core.errors import AssemblyError, ModelError
+from dms_core.errors import ModelError
 from dms_core.linear.lu import assemble as assemble_lu
 from dms_core.linear.lu import factor, storage
 from dms_core.linear.ordering import SingularMatrixError
@@ -30,6 +30,9 @@ TYPICAL_C0 = 1.5e3
 
 NEARBY_STATES, NEARBY = 6, 0.1
 """Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
+
+VANISHING = 1e-3
+"""Least size of an entry over those states, relative to one of them, below which it is no pivot."""
 
 GOOD_PIVOT = 1e-6
 """Smallest relative pivot with which no other order is tried: ten digits are left."""
@@ -64,15 +67,16 @@ class LinearSystem:
         """As `ordered`, with the order whose smallest relative pivot over all samples is the largest.
 
         An entry that is large at the start and zero later (a saturated command, a slack tendon) must not become a
-        pivot. The first order tried is that of the least sizes over the samples; they are no matrix that occurs, and
-        rows of it may cancel where the real ones do not, hence the test on real values and the other candidates.
+        pivot: each order is chosen on one sample in which such entries are replaced by their least size. All others
+        keep their values: only with them is the rotational inertia of a body, of rank 3 in four columns, singular.
 
         Args:
             samples: entries at the start, then at nearby states.
         """
-        least = np.copysign(np.min(np.abs(samples), axis=0), samples[0])
+        least = np.min(np.abs(samples), axis=0)
         best, found, problem = -1.0, None, None
-        for values in (least, *samples):
+        for sample in samples:
+            values = np.where(least < VANISHING * np.abs(sample), np.copysign(least, sample), sample)
             try:
                 candidate = self.ordered(values)
             except ModelError as error:
@@ -171,11 +175,10 @@ class Model:
         packed = Packed(newton)
         newton, newton_lu = LinearSystem(
             newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
-        ).best_order(
-            self._samples(
-                work, len(slots.number), lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x)
-            )
-        )
+        ).best_order(self._samples(
+            work, len(slots.number),
+            lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x),
+        ))  # fmt: skip
         rates, slots = rate_pattern(layout, active)
         packed_rates = Packed(rates)
         rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*layout.names, *rows]).best_order(
