@@ -37,8 +37,17 @@ def check(model: Positional[Path]) -> int:
     Args:
         model: model file (YAML).
     """
-    print(report(Model(load(model))))
+    print(report(compiled(model)))
     return 0
+
+
+def compiled(path: Path) -> Model:
+    """The model of a file; whatever is wrong with it names the file."""
+    system = load(path)
+    try:
+        return Model(system)
+    except DmsError as error:
+        raise type(error)(f"{path}: {error}") from None
 
 
 def report(model: Model) -> str:
@@ -94,7 +103,7 @@ def run(
     for path in (out, stats):
         if path is not None:
             check_writable(path)
-    simulation = Simulation(Model(load(model)), options)
+    simulation = Simulation(compiled(model), options)
     with tqdm(total=t_end, unit="s", delay=LONG_RUN, leave=False, disable=None, bar_format=BAR) as bar:
         simulation.advance(t_end, _moves(bar))
     trajectory = simulation.trajectory()

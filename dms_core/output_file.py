@@ -27,6 +27,8 @@ def check_writable(path: str | Path) -> Path:
     path = Path(path)
     if path.is_dir():
         raise InputError(f"output '{path}' is a folder; give the name of a file in it.")
+    if path.parent.exists() and not path.parent.is_dir():
+        raise InputError(f"output '{path}': '{path.parent}' is a file, not a folder; choose another place.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Permission bits tell root nothing and network drives lie; only writing shows that writing works.

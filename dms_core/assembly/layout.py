@@ -59,20 +59,20 @@ class Layout:
         self.index = {name: k for k, name in enumerate(self.names)}
         self.input_index = {u.name: k for k, u in enumerate(system.inputs)}
         self.dynamics = [
-            self._call(e, p) for e in (*system.bodies, *system.forces) for p in e.placements(system)
+            self._call(e, p) for e in (*system.bodies, *system.forces) for p in _placed(e, system)
         ]
         self.constraints: list[Call] = []
         self.row_names: list[str] = []
         for constraint in system.constraints:
             rows = constraint.rows()
-            self.constraints.append(self._call(constraint, constraint.place(system), len(self.row_names), len(rows)))
+            self.constraints.append(self._call(constraint, *_placed(constraint, system), len(self.row_names), len(rows)))
             self.row_names += [f"{constraint.name}.{row}" for row in rows]
         self.n_phi = len(self.row_names)
         self.sensors: list[Call] = []
         self.outputs: list[tuple[str, str]] = []
         for sensor in system.sensors:
             parts = sensor.outputs()
-            self.sensors.append(self._call(sensor, sensor.place(system), len(self.outputs), len(parts)))
+            self.sensors.append(self._call(sensor, *_placed(sensor, system), len(self.outputs), len(parts)))
             self.outputs += [(f"{sensor.name}.{part}" if part else sensor.name, unit) for part, unit in parts]
 
     def body_indices(self, name: str) -> np.ndarray:
@@ -110,3 +110,12 @@ class Layout:
                 return slice(call.row, call.row + call.rows)
         names = [c.element.name for c in self.constraints]
         raise ModelError(f"constraint '{name}' does not exist. Declared: {choices(names)}.")
+
+
+def _placed(element: DynamicElement | Constraint | Sensor, system: System) -> tuple[Placement, ...]:
+    """Placements of an element; what it asks of the system in vain is an error that names the element."""
+    try:
+        return element.placements(system) if isinstance(element, DynamicElement) else (element.place(system),)
+    except ModelError as error:
+        who = f"{element.kind} '{element.name}'"
+        raise ModelError(str(error) if who in str(error) else f"{who}: {error}") from None
