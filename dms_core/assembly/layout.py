@@ -58,14 +58,14 @@ class Layout:
             raise ModelError(f"system '{system.name}' has no coordinates: declare at least one body or equation.")
         self.index = {name: k for k, name in enumerate(self.names)}
         self.input_index = {u.name: k for k, u in enumerate(system.inputs)}
-        self.dynamics = [
-            self._call(e, p) for e in (*system.bodies, *system.forces) for p in _placed(e, system)
-        ]
+        self.dynamics = [self._call(e, p) for e in (*system.bodies, *system.forces) for p in _placed(e, system)]
         self.constraints: list[Call] = []
         self.row_names: list[str] = []
         for constraint in system.constraints:
             rows = constraint.rows()
-            self.constraints.append(self._call(constraint, *_placed(constraint, system), len(self.row_names), len(rows)))
+            self.constraints.append(
+                self._call(constraint, *_placed(constraint, system), len(self.row_names), len(rows))
+            )
             self.row_names += [f"{constraint.name}.{row}" for row in rows]
         self.n_phi = len(self.row_names)
         self.sensors: list[Call] = []
