@@ -120,14 +120,18 @@ class Simulation:
         k = self.model.input_index(name)
         signal = self.model.system.inputs[k].signal
         if not isinstance(signal, Constant):
-            raise InputError(f"input '{name}' is declared as a course in time ({signal.kind}); only a constant one can be set.")
+            raise InputError(
+                f"input '{name}' is declared as a course in time ({signal.kind}); only a constant one can be set."
+            )
         if not math.isfinite(value):
             raise InputError(f"input '{name}' = {value}; a finite number is wanted.")
         row = self.state.signals.ptr[k]
         if self.state.signals.c[row, 0] != value:
-            self._settings.setdefault(k, [(-1.0, float(self.state.signals.c[row, 0]))]).append((self.time, float(value)))
+            self._settings.setdefault(k, [(-1.0, float(self.state.signals.c[row, 0]))]).append(
+                (self.time, float(value))
+            )
             self.state.signals.c[row, 0] = value
-            self.state.count[RESTART] = 1
+            self.state.countss[RESTART] = 1
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.
@@ -138,8 +142,9 @@ class Simulation:
         if not math.isfinite(t_end) or t_end < self.time:
             raise InputError(f"t_end = {t_end} s; a time not before the present {self.time:.6g} s is wanted.")
         try:
-            code = self._advance(float(t_end), progress)
-            if code == step_control.MATRIX_SINGULAR and self._reorder():
+            code, stuck = self._advance(float(t_end), progress), -math.inf
+            while code == step_control.MATRIX_SINGULAR and self.time > stuck and self._reorder():
+                stuck = self.time
                 code = self._advance(float(t_end), progress)
         except KeyboardInterrupt:
             self.result = Result.INTERRUPTED
@@ -172,7 +177,7 @@ class Simulation:
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
-        c, x = self.state.count, self.state.largest
+        c, x = self.state.counts, self.state.largest
         return SolveStats(
             int(c[STEPS]), int(c[REJECTED_ERROR]), int(c[REJECTED_NEWTON]), int(c[ITERATIONS]), int(c[FACTORISATIONS]),
             int(c[RESTARTS]), float(x[PHI]), float(x[PHI_V]), float(x[MU]),

@@ -32,6 +32,8 @@ MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
 SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping."""
+POOR = 0.4
+"""Contraction above which even a matrix of this stage is evaluated anew at the present iterate."""
 SINGULAR_PIVOT = 1e-14
 """Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
 C0_CHANGE = 0.1
@@ -93,7 +95,7 @@ def correction_norm(s, c0):
 @njit(cache=True, error_model="numpy")
 def refresh(m, s, c0):
     """Evaluate residual and matrix here and factorise; False if the matrix is singular."""
-    values, count = floats(s, STATE.newton_values), ints(s, STATE.count)
+    values, count = floats(s, STATE.newton_values), ints(s, STATE.counts)
     evaluate_newton(
         inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.newton), inner(s, STATE.w), c0, values
     )
@@ -109,9 +111,14 @@ def correction(m, s, c0):
     """Newton correction x at the present iterate, with the matrix at hand; gives its norm."""
     right_hand_side(m, s, c0)
     back_substitute(
-        m, MODEL.newton_lu, floats(s, STATE.newton_values), floats(s, STATE.b), floats(s, STATE.x), floats(s, STATE.newton_work)
+        m,
+        MODEL.newton_lu,
+        floats(s, STATE.newton_values),
+        floats(s, STATE.b),
+        floats(s, STATE.x),
+        floats(s, STATE.newton_work),
     )
-    ints(s, STATE.count)[ITERATIONS] += 1
+    ints(s, STATE.counts)[ITERATIONS] += 1
     return correction_norm(s, c0)
 
 
@@ -183,7 +190,12 @@ def newton(m, s, o, c0):
 
     STALE_MATRIX asks the caller to put the guess back and to call again with count[STALE] = 1.
     """
-    clock, count, x, x_before = floats(s, STATE.clock), ints(s, STATE.count), floats(s, STATE.x), floats(s, STATE.x_before)
+    clock, count, x, x_before = (
+        floats(s, STATE.clock),
+        ints(s, STATE.counts),
+        floats(s, STATE.x),
+        floats(s, STATE.x_before),
+    )
     dynamics, constraints, w = inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w)
     set_rates(s, c0)
     fresh = count[STALE] == 1 or abs(c0 / clock[C0_FACTORED] - 1.0) > C0_CHANGE
@@ -217,5 +229,10 @@ def newton(m, s, o, c0):
             return STALE_MATRIX, k
         x_before[:] = x
         before = norm
-        evaluate_residual(dynamics, constraints, w)
+        if k > 0 and fresh and contraction > POOR:
+            # A kink lies between guess and solution (a fibre that stops shortening): the matrix of the far side is needed.
+            if not refresh(m, s, c0):
+                return SINGULAR, k
+        else:
+            evaluate_residual(dynamics, constraints, w)
     return (DIVERGED if fresh else STALE_MATRIX), MAX_ITERATIONS
