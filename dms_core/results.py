@@ -23,7 +23,9 @@ class Result(Enum):
     NEWTON_FAILED = "Newton's method did not converge at the smallest allowed step; look for a force without a derivative, or take a smaller fixed step."  # noqa: E501
     MATRIX_SINGULAR = "The Newton matrix is singular: the mechanism is in a singular position or a body has no inertia along a free direction."  # noqa: E501
     TOO_MANY_STEPS = "The largest number of steps was used up before the end time; raise max_steps or loosen rtol."
-    RATES_FAILED = "No accelerations and multipliers satisfy the equations at a start or jump; look for an input far out of range."  # noqa: E501
+    RATES_FAILED = (
+        "No accelerations and multipliers satisfy the equations at a start or jump; look for an input far out of range."  # noqa: E501
+    )
     INTERRUPTED = "The run was interrupted by the user; what was computed before is complete."
 
 

@@ -72,7 +72,8 @@ def read_yaml(path: str | Path) -> Section:
     except yaml.YAMLError as error:
         raise InputError(_sentence(path, error)) from None
     if not isinstance(found, Section):
-        raise InputError(f"file '{path}' holds {type(found).__name__}, not a mapping of keys to values.")
+        what = "nothing" if found is None else f"a {type(found).__name__}"
+        raise InputError(f"file '{path}' holds {what}; a mapping of keys to values is wanted.")
     return found
 
 

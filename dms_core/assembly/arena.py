@@ -37,8 +37,16 @@ class Packed:
                 self._inner.append(inner)
                 self.table[k] = (inner.table.ctypes.data, *inner.table.shape)
             elif isinstance(value, np.ndarray):
-                if not value.flags.c_contiguous or value.dtype not in (np.float64, np.int64, np.int32, np.uint32, np.bool_):
-                    raise TypeError(f"{values._fields[k]}: a contiguous array of floats, integers or booleans is wanted.")
+                if not value.flags.c_contiguous or value.dtype not in (
+                    np.float64,
+                    np.int64,
+                    np.int32,
+                    np.uint32,
+                    np.bool_,
+                ):
+                    raise TypeError(
+                        f"{values._fields[k]}: a contiguous array of floats, integers or booleans is wanted."
+                    )
                 self.table[k] = (value.ctypes.data, value.shape[0], value.shape[1] if value.ndim > 1 else 1)
             else:
                 self.table[k] = (0, int(value), 1)

@@ -64,7 +64,7 @@ class Layout:
         for constraint in system.constraints:
             rows = constraint.rows()
             self.constraints.append(
-                self._call(constraint, *_placed(constraint, system), len(self.row_names), len(rows))
+                self._call(constraint, _placed(constraint, system)[0], len(self.row_names), len(rows))
             )
             self.row_names += [f"{constraint.name}.{row}" for row in rows]
         self.n_phi = len(self.row_names)
@@ -72,7 +72,7 @@ class Layout:
         self.outputs: list[tuple[str, str]] = []
         for sensor in system.sensors:
             parts = sensor.outputs()
-            self.sensors.append(self._call(sensor, *_placed(sensor, system), len(self.outputs), len(parts)))
+            self.sensors.append(self._call(sensor, _placed(sensor, system)[0], len(self.outputs), len(parts)))
             self.outputs += [(f"{sensor.name}.{part}" if part else sensor.name, unit) for part, unit in parts]
 
     def body_indices(self, name: str) -> np.ndarray:

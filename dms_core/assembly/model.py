@@ -153,7 +153,7 @@ class Model:
         return self._tables
 
     def reordered(self, q: np.ndarray, v: np.ndarray, t: float) -> Packed:
-        """Tables with independent rows and elimination orders chosen anew at q, v [shape (n_q,)], for a run that needs them.
+        """Tables with independent rows and elimination orders chosen anew at q, v, shape (n_q,).
 
         Raises:
             ModelError: the equations are singular there.
@@ -187,10 +187,9 @@ class Model:
             )
         )
         scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
-        return Tables(
-            self._dynamics.values, self._constraints.values, self._sensors.values, newton, newton_lu, rates, rate_lu, active,
-            self.second_order, np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1]),
-        )  # fmt: skip
+        calls = (self._dynamics.values, self._constraints.values, self._sensors.values)
+        scale_q, scale_v = np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1])
+        return Tables(*calls, newton, newton_lu, rates, rate_lu, active, self.second_order, scale_q, scale_v)
 
     def _samples(self, work: Work, size: int, evaluate: Callable[[np.ndarray], None]) -> list[np.ndarray]:
         """Matrix entries at the state in `work` and at nearby ones, where they are finite."""

@@ -1,6 +1,6 @@
 """The one loop over all elements: local coordinates in, residual and derivatives out (paper eq. 2).
 
-    r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi        r4 = phi_q v + phi_t
+r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi        r4 = phi_q v + phi_t
 """
 
 import math
@@ -141,7 +141,12 @@ def evaluate_constraint(calls, e, w, level):
 def add_constraint_values(calls, e, w, n):
     """Rows of phi and phi_q v + phi_t of call e, from its local arrays."""
     rows = ints(calls, CALLS.row)
-    phi, phi_v, phi_l, phi_t_l = floats(w, WORK.phi), floats(w, WORK.phi_v), floats(w, WORK.phi_l), matrix(w, WORK.phi_t_l)
+    phi, phi_v, phi_l, phi_t_l = (
+        floats(w, WORK.phi),
+        floats(w, WORK.phi_v),
+        floats(w, WORK.phi_l),
+        matrix(w, WORK.phi_t_l),
+    )
     G, v_l = matrix(w, WORK.G), floats(w, WORK.v_l)
     for k in range(rows[e + 1] - rows[e]):
         rate = phi_t_l[k, 0]
@@ -211,7 +216,8 @@ def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
     values[:] = 0.0
     h = 1.0 / c0
     Jq, Jv, Ja, G, W, H = (
-        matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G), matrix(w, WORK.W), matrix(w, WORK.H),
+        matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G), matrix(w, WORK.W),
+        matrix(w, WORK.H),
     )  # fmt: skip
     minus, plus = indices(pattern, NEWTON.minus), indices(pattern, NEWTON.plus)
     for i in range(minus.shape[0]):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from dms_core.assembly.arena import fields, floats, indices, inner, ints, matrix
+from dms_core.assembly.arena import fields, floats, indices, ints, matrix
 from dms_core.assembly.layout import Layout
 from dms_core.assembly.residual import (
     CALLS,
@@ -23,8 +23,19 @@ from dms_core.assembly.residual import (
     integers_of,
     numbers_of,
 )
-from dms_core.model.rotations import add, add_gradient, bilinear, cross, dot, euler_parameters, point, rotated, scale, sub, vec
-from dms_core.model.sensors.joint_moment import JOINT_MOMENT
+from dms_core.model.rotations import (
+    add,
+    add_gradient,
+    bilinear,
+    cross,
+    dot,
+    euler_parameters,
+    point,
+    rotated,
+    scale,
+    sub,
+    vec,
+)
 from dms_core.model.sensors.reaction import REACTION
 
 
@@ -37,7 +48,10 @@ class Composition(NamedTuple):
 
 
 class Partials(NamedTuple):
-    """Derivatives of all sensor components at one state, dense: shapes (n_y, n_q + 7) three times, (n_y, n_phi), (n_y, n_u)."""
+    """Derivatives of all sensor components at one state, dense.
+
+    Shapes (n_y, n_q + 7) three times, (n_y, n_phi), (n_y, n_u).
+    """
 
     q: np.ndarray
     v: np.ndarray
@@ -134,7 +148,9 @@ def reaction_partials(constraints, sensors, e, w, c, by_q, by_lam):
         for i in range(7):
             load[i] = -G[k, o + i]
         d_force = vec(load, 0)
-        _turn_partials(q, frame, row, rows[c] + k, d_force, sub(ground_moment(q, o, load, 3), cross(arm, d_force)), by_lam)
+        _turn_partials(
+            q, frame, row, rows[c] + k, d_force, sub(ground_moment(q, o, load, 3), cross(arm, d_force)), by_lam
+        )
     if frame >= 0:
         moment = sub(ground_moment(q, o, r, 3), cross(arm, force))
         _frame_partials(w, n, frame, row, force, moment, iq[first : first + n], by_q)
@@ -178,7 +194,12 @@ def _joint(sensors, e, w):
 def joint_moment(dynamics, sensors, e, w, sources):
     """Sensor e, moment of the dynamic calls in `sources`: value into y_l[0]."""
     axis, centre = _joint(sensors, e, w)
-    q_l, r_l, iq, ptr = floats(w, WORK.q_l), floats(w, WORK.r_l), indices(dynamics, CALLS.iq), ints(dynamics, CALLS.iq_ptr)
+    q_l, r_l, iq, ptr = (
+        floats(w, WORK.q_l),
+        floats(w, WORK.r_l),
+        indices(dynamics, CALLS.iq),
+        ints(dynamics, CALLS.iq_ptr),
+    )
     total = 0.0
     for s in sources:
         n = evaluate_dynamic(dynamics, s, w, 0)
@@ -216,7 +237,12 @@ def joint_moment_partials(dynamics, sensors, e, w, sources, by_q, by_v, by_a):
     """Derivatives of the moment by q, v and vdot, scattered into the dense partials."""
     row, par = ints(sensors, CALLS.row)[e], numbers_of(sensors, e)
     axis, centre = _joint(sensors, e, w)
-    q_l, r_l, iq, ptr = floats(w, WORK.q_l), floats(w, WORK.r_l), indices(dynamics, CALLS.iq), ints(dynamics, CALLS.iq_ptr)
+    q_l, r_l, iq, ptr = (
+        floats(w, WORK.q_l),
+        floats(w, WORK.r_l),
+        indices(dynamics, CALLS.iq),
+        ints(dynamics, CALLS.iq_ptr),
+    )
     Jq, Jv, Ja = matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja)
     pull, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for s in sources:
@@ -284,7 +310,8 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
     Yq, Yv, Ya = matrix(w, WORK.Yq), matrix(w, WORK.Yv), matrix(w, WORK.Ya)
     Yl, Yu = matrix(w, WORK.Yl), matrix(w, WORK.Yu)
     iq, ptr, iu, u_ptr = (
-        indices(sensors, CALLS.iq), ints(sensors, CALLS.iq_ptr), indices(sensors, CALLS.iu), ints(sensors, CALLS.iu_ptr),
+        indices(sensors, CALLS.iq), ints(sensors, CALLS.iq_ptr), indices(sensors, CALLS.iu),
+        ints(sensors, CALLS.iu_ptr),
     )  # fmt: skip
     for e in range(kernels.shape[0]):
         if kernels[e] == 0:

@@ -97,7 +97,8 @@ def _part(slots: Slots, entries: Iterable[tuple[np.ndarray, Any, Any]], transpos
                 j.append(m)
                 slot.append(number)
         ptr.append(len(slot))
-    return Part(*(np.array(x, np.int32) for x in (i, j, slot)), np.array(ptr, np.int64))
+    rows_of, columns_of, slots_of = (np.array(x, np.int32) for x in (i, j, slot))
+    return Part(rows_of, columns_of, slots_of, np.array(ptr, np.int64))
 
 
 def _dynamic_blocks(call: Call) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -135,7 +136,9 @@ def newton_pattern(layout: Layout, active: np.ndarray) -> tuple[NewtonPattern, S
     slots, at = Slots(), _Index(layout, active)
     minus = np.array([slots.add(k, k) for k in range(n)], np.int32)
     plus = np.array([slots.add(k, n + k) for k in range(n)], np.int32)
-    dyn = [(*_dynamic_blocks(c), at.coordinate(c, n), at.coordinate(c, 0), at.coordinate(c, n)) for c in layout.dynamics]
+    dyn = [
+        (*_dynamic_blocks(c), at.coordinate(c, n), at.coordinate(c, 0), at.coordinate(c, n)) for c in layout.dynamics
+    ]
     con = [(c, *_constraint_blocks(c)) for c in layout.constraints]
     q = at.coordinate
     return NewtonPattern(
@@ -174,7 +177,7 @@ def rate_pattern(layout: Layout, active: np.ndarray) -> tuple[RatePattern, Slots
 
 def moved(pattern: Any, position: np.ndarray) -> Any:
     """The same scatter into other slots: slot -> position[slot] (where the LU keeps that entry)."""
-    parts = []
+    parts: list[Any] = []
     for part in pattern:
         if isinstance(part, Part):
             parts.append(part._replace(slot=np.ascontiguousarray(position[part.slot].astype(np.int32))))

@@ -100,7 +100,9 @@ def _flat(parts: list[Any], dtype: Any) -> tuple[np.ndarray, np.ndarray]:
 def call_tables(calls: list[Call], signature: Any) -> Calls:
     """Tables of all calls of one kind; kernels are compiled here, or loaded from numba's cache."""
     kernels = [
-        address(type(c.element).kernel, signature, f"{c.element.kind} '{c.element.name}'") if type(c.element).kernel is not None else 0
+        address(type(c.element).kernel, signature, f"{c.element.kind} '{c.element.name}'")
+        if type(c.element).kernel is not None
+        else 0
         for c in calls
     ]
     return Calls(
@@ -165,7 +167,7 @@ def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
 
 
 def with_settings(signals: Signals, settings: dict[int, list[tuple[float, float]]]) -> Signals:
-    """The same inputs, those that were set between calls as the steps they made: settings[k] = [(time [s], value), ...]."""
+    """The same inputs, those set between calls as the steps they made: settings[k] = [(time [s], value), ...]."""
     starts, coefficients = [], []
     for k in range(len(signals.kind)):
         t, c = (x[signals.ptr[k] : signals.ptr[k + 1]] for x in (signals.t, signals.c))
@@ -189,11 +191,11 @@ def new_work(layout: Layout) -> Work:
     big = layout.n_q + 7
     zeros = np.zeros
     q, v = layout.start()
-    square = [zeros((n, n)) for _ in range(3)]
     return Work(
-        q, v, zeros(big), zeros(layout.n_phi), zeros(layout.n_phi), zeros((len(layout.input_index), 3)),
-        zeros(len(layout.outputs)), zeros(big), zeros(big), zeros(layout.n_phi), zeros(layout.n_phi), zeros(layout.n_phi),
-        zeros(n), zeros(n), zeros(n), zeros(m), zeros((k, 3)), zeros(n), *square,
-        zeros(m), zeros((m, 2)), zeros((m, n)), zeros((m, n)), zeros((n, n)),
-        zeros(y), zeros((y, n)), zeros((y, n)), zeros((y, n)), zeros((y, m)), zeros((y, k)),
+        q=q, v=v, a=zeros(big), lam=zeros(layout.n_phi), mu=zeros(layout.n_phi), u=zeros((len(layout.input_index), 3)),
+        y=zeros(len(layout.outputs)), r2=zeros(big), gmu=zeros(big), phi=zeros(layout.n_phi), phi_v=zeros(layout.n_phi),
+        phi_a=zeros(layout.n_phi), q_l=zeros(n), v_l=zeros(n), a_l=zeros(n), lam_l=zeros(m), u_l=zeros((k, 3)),
+        r_l=zeros(n), Jq=zeros((n, n)), Jv=zeros((n, n)), Ja=zeros((n, n)), phi_l=zeros(m), phi_t_l=zeros((m, 2)),
+        G=zeros((m, n)), W=zeros((m, n)), H=zeros((n, n)), y_l=zeros(y), Yq=zeros((y, n)), Yv=zeros((y, n)),
+        Ya=zeros((y, n)), Yl=zeros((y, m)), Yu=zeros((y, k)),
     )  # fmt: skip

@@ -65,7 +65,7 @@ class Fill(NamedTuple):
     """Pattern of L + U by rows, columns ascending, and of L by columns."""
 
     start: np.ndarray
-    index: np.ndarray
+    column: np.ndarray
     diagonal: np.ndarray
     below_start: np.ndarray
     below: np.ndarray
@@ -76,13 +76,16 @@ def plan(n: int, rows: np.ndarray, cols: np.ndarray, values: np.ndarray, *, thre
 
     Args:
         n: number of unknowns.
-        rows, cols, values: entries of a typical matrix, shape (nnz,); zeros keep their place in the pattern.
+        rows: row of each entry, shape (nnz,).
+        cols: column of each entry.
+        values: entries of a typical matrix; zeros keep their place in the pattern.
         threshold: smallest pivot relative to its row, see ordering.markowitz.
 
     Raises:
         SingularMatrixError: names the rows and columns that are left over.
     """
-    best, least = None, np.inf
+    best: tuple = ()
+    least = np.inf
     seeds = int(np.clip(100_000 // max(len(rows), 1), 1, 6))
     for window, free_cost in ((0, 0), (80, 60), (20, 60)):
         for seed in range(seeds):
@@ -98,8 +101,10 @@ def symbolic(n: int, rows: np.ndarray, cols: np.ndarray, row_perm: np.ndarray, c
 
     Args:
         n: number of unknowns.
-        rows, cols: pattern, shape (nnz,).
-        row_perm, col_perm: step k eliminates entry (row_perm[k], col_perm[k]), shape (n,).
+        rows: row of each entry of the pattern, shape (nnz,).
+        cols: column of each entry.
+        row_perm: step k eliminates entry (row_perm[k], col_perm[k]), shape (n,).
+        col_perm: see row_perm.
 
     Raises:
         InputError: the order is no permutation.
@@ -211,7 +216,7 @@ def _depth_first(n, fill):
     waits = np.zeros(n, np.int64)
     for k in range(n):
         for p in range(fill.diagonal[k] + 1, fill.start[k + 1]):
-            waits[fill.index[p]] += 1
+            waits[fill.column[p]] += 1
         for p in range(fill.below_start[k], fill.below_start[k + 1]):
             waits[fill.below[p]] += 1
     stack, order, top = np.empty(n, np.int64), np.empty(n, np.int64), 0
@@ -224,7 +229,7 @@ def _depth_first(n, fill):
         k = stack[top]
         order[m], bottom = k, top
         for p in range(fill.diagonal[k] + 1, fill.start[k + 1]):
-            top = _release(fill.index[p], waits, stack, top)
+            top = _release(fill.column[p], waits, stack, top)
         for p in range(fill.below_start[k], fill.below_start[k + 1]):
             top = _release(fill.below[p], waits, stack, top)
         stack[bottom:top] = np.sort(stack[bottom:top])[::-1]
@@ -254,8 +259,8 @@ def _groups(n, fill, block_cost, group_cost):
         for p in range(fill.start[k], fill.start[k + 1]):
             gap = WIDTH + 1
             if p + 1 < fill.start[k + 1]:
-                gap = min(gap, fill.index[p + 1] - fill.index[p])
-            saved[fill.index[p], gap] += block_cost + (below if p >= fill.diagonal[k] else 0)
+                gap = min(gap, fill.column[p + 1] - fill.column[p])
+            saved[fill.column[p], gap] += block_cost + (below if p >= fill.diagonal[k] else 0)
     best, previous = np.full(n + 1, np.inf), np.zeros(n + 1, np.int64)
     best[0] = 0.0
     for s in range(n):
@@ -291,7 +296,7 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
         (group.size + 1) * WIDTH,
         int(leading.sum()) * WIDTH,
         target.size,
-        fill.index.size,
+        fill.column.size,
         int((below * right).sum()),
         position,
         np.asarray(row_perm).astype(np.uint32),
@@ -304,11 +309,11 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
 def _blocks(n, fill, slot):
     """Offsets of each row's first block, pivot's block and end, and the first slot of every block."""
     first, diagonal, end = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
-    group, count = np.empty(fill.index.size, np.int64), 0
+    group, count = np.empty(fill.column.size, np.int64), 0
     for k in range(n):
         first[k] = count * WIDTH
         for p in range(fill.start[k], fill.start[k + 1]):
-            g = slot[fill.index[p]] // WIDTH * WIDTH
+            g = slot[fill.column[p]] // WIDTH * WIDTH
             if count * WIDTH == first[k] or group[count - 1] != g:
                 group[count] = g
                 count += 1

@@ -7,7 +7,8 @@ and scatters what it wrote; the element never learns where its numbers go.
 Local coordinates: seven per body named in `Placement.bodies` (position of the centre of mass, Euler parameters;
 the ground and a point mass look like bodies whose missing coordinates are constant), then `Placement.coordinates`.
 The local arrays are work space of the largest size any element needs, so that a kernel must know its own sizes (from
-`ip`) and never ask for len(q). All outputs are zero before a kernel is called. `level` is 0 for values, 1 for values and derivatives.
+`ip`) and never ask for len(q). All outputs are zero before a kernel is called. `level` is 0
+for values, 1 for values and derivatives.
 
 Dynamic kernel (bodies, forces, ropes, muscles, controllers): rows of M vdot + phi_q^T lam - f = 0
 

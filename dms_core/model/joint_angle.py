@@ -1,5 +1,4 @@
-"""The angle between two bodies about an axis of body i, with its derivatives: one geometry for sensors, drivers,
-springs and controllers.
+"""The angle between two bodies about an axis of body i: one geometry for sensors, drivers, springs, controllers.
 
     theta = atan2(s, c),   c = (A_i f) . (A_j h),   s = (A_i g) . (A_j h)
 
@@ -125,7 +124,11 @@ def angle_frame(system, who: str, body_i: str, body_j: str, axis_i, pointer_i=No
     two reference frames are parallel, which is the custom of anatomical joints whose bodies share axes.
     """
     axis = unit(axis_i, f"{who}: axis_i")
-    f = perpendicular(axis) if pointer_i is None else np.asarray(pointer_i, float) - axis * (axis @ np.asarray(pointer_i, float))
+    f = (
+        perpendicular(axis)
+        if pointer_i is None
+        else np.asarray(pointer_i, float) - axis * (axis @ np.asarray(pointer_i, float))
+    )
     f = unit(f, f"{who}: pointer_i (its part perpendicular to the axis)")
     h = f if pointer_j is None else unit(pointer_j, f"{who}: pointer_j")
     return np.concatenate([f, np.cross(axis, f), h])

@@ -20,19 +20,19 @@ from dms_core.model.rotations import (
     sub,
 )
 
-I, J = 0, 7
+BODY_I, BODY_J = 0, 7
 
 
 @njit(cache=True)
 def separation(s_i, s_j, q):
     """d: from the point of body j to the point of body i, ground axes [m]."""
-    return sub(point(q, I, s_i), point(q, J, s_j))
+    return sub(point(q, BODY_I, s_i), point(q, BODY_J, s_j))
 
 
 @njit(cache=True)
 def separation_rate(s_i, s_j, q, v):
     """C v [m/s]."""
-    return sub(point_rate(q, v, I, s_i), point_rate(q, v, J, s_j))
+    return sub(point_rate(q, v, BODY_I, s_i), point_rate(q, v, BODY_J, s_j))
 
 
 @njit(cache=True)
@@ -47,15 +47,15 @@ def _row(w, g, h):
 @njit(cache=True)
 def separation_gradient(s_i, s_j, q, d):
     """d^T C for any vector d held fixed, as a 14-tuple; with the separation itself it is e_q."""
-    return _row(d, k_times(d, s_i, euler_parameters(q, I)), k_times(d, s_j, euler_parameters(q, J)))
+    return _row(d, k_times(d, s_i, euler_parameters(q, BODY_I)), k_times(d, s_j, euler_parameters(q, BODY_J)))
 
 
 @njit(cache=True)
 def separation_rate_gradient(s_i, s_j, q, v):
     """(e_q v)_q = e_qq v, as a 14-tuple: d^T C_qq v + (C v)^T C."""
     d, d_t = separation(s_i, s_j, q), separation_rate(s_i, s_j, q, v)
-    g = _plus(k_times(d, s_i, euler_parameters(v, I)), k_times(d_t, s_i, euler_parameters(q, I)))
-    h = _plus(k_times(d, s_j, euler_parameters(v, J)), k_times(d_t, s_j, euler_parameters(q, J)))
+    g = _plus(k_times(d, s_i, euler_parameters(v, BODY_I)), k_times(d_t, s_i, euler_parameters(q, BODY_I)))
+    h = _plus(k_times(d, s_j, euler_parameters(v, BODY_J)), k_times(d_t, s_j, euler_parameters(q, BODY_J)))
     return _row(d_t, g, h)
 
 
@@ -69,23 +69,28 @@ def _plus(x, y):
 def add_separation_hessian(s_i, s_j, q, factor, H):
     """H[:, :] += factor e_qq."""
     d = separation(s_i, s_j, q)
-    c_i, c_j = columns(q, I, s_i), columns(q, J, s_j)
+    c_i, c_j = columns(q, BODY_I, s_i), columns(q, BODY_J, s_j)
     for m in range(3):
-        for x, y, sign in ((I, I, 1.0), (J, J, 1.0), (I, J, -1.0), (J, I, -1.0)):
+        for x, y, sign in (
+            (BODY_I, BODY_I, 1.0),
+            (BODY_J, BODY_J, 1.0),
+            (BODY_I, BODY_J, -1.0),
+            (BODY_J, BODY_I, -1.0),
+        ):
             H[x + m, y + m] += sign * factor
         for n in range(4):
             # Rows of r_i carry (c_i, -c_j), rows of r_j their opposite; then the transposed entries.
-            for x, sign in ((I, factor), (J, -factor)):
-                H[x + m, I + 3 + n] += sign * c_i[n][m]
-                H[I + 3 + n, x + m] += sign * c_i[n][m]
-                H[x + m, J + 3 + n] -= sign * c_j[n][m]
-                H[J + 3 + n, x + m] -= sign * c_j[n][m]
+            for x, sign in ((BODY_I, factor), (BODY_J, -factor)):
+                H[x + m, BODY_I + 3 + n] += sign * c_i[n][m]
+                H[BODY_I + 3 + n, x + m] += sign * c_i[n][m]
+                H[x + m, BODY_J + 3 + n] -= sign * c_j[n][m]
+                H[BODY_J + 3 + n, x + m] -= sign * c_j[n][m]
     # add_cross_hessian writes the product and its transpose: half of it where both blocks are one body's.
-    add_cross_hessian(H, q, I, s_i, I, s_i, 0.5 * factor)
-    add_cross_hessian(H, q, J, s_j, J, s_j, 0.5 * factor)
-    add_cross_hessian(H, q, I, s_i, J, s_j, -factor)
-    add_hessian(H, I, d, s_i, factor)
-    add_hessian(H, J, d, s_j, -factor)
+    add_cross_hessian(H, q, BODY_I, s_i, BODY_I, s_i, 0.5 * factor)
+    add_cross_hessian(H, q, BODY_J, s_j, BODY_J, s_j, 0.5 * factor)
+    add_cross_hessian(H, q, BODY_I, s_i, BODY_J, s_j, -factor)
+    add_hessian(H, BODY_I, d, s_i, factor)
+    add_hessian(H, BODY_J, d, s_j, -factor)
 
 
 def separation_pattern(s_i, s_j) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +98,7 @@ def separation_pattern(s_i, s_j) -> tuple[np.ndarray, np.ndarray]:
     turn_i, turn_j = bool(np.any(s_i)), bool(np.any(s_j))
     row = np.array([True] * 3 + [turn_i] * 4 + [True] * 3 + [turn_j] * 4)
     H = np.outer(row, row)
-    for x in (I, J):
-        for y in (I, J):
+    for x in (BODY_I, BODY_J):
+        for y in (BODY_I, BODY_J):
             H[x : x + 3, y : y + 3] = np.eye(3, dtype=bool)
     return row, H

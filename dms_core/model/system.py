@@ -51,7 +51,7 @@ class System:
             if element.name in self._by_name:
                 first = self._by_name[element.name]
                 raise ModelError(
-                    f"the name '{element.name}' is used by a {first.kind} and by a {element.kind}; names must be unique."
+                    f"the name '{element.name}' is used by a {first.kind} and a {element.kind}; names must be unique."
                 )
             self._by_name[element.name] = element
 

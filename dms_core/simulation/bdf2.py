@@ -10,7 +10,6 @@ the L-stable SDIRK method of order 2 with gamma = 1 - 1/sqrt 2 (Alexander 1977):
 have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 gamma^3| = 0.0404 h^3 y'''.
 """
 
-
 import math
 
 from numba import njit
@@ -54,7 +53,7 @@ def put_guess(m, s, c0, lam_slope):
 @njit(cache=True, error_model="numpy")
 def solve_stage(m, s, o, t, c0, lam_slope):
     """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once."""
-    count = ints(s, STATE.count)
+    count = ints(s, STATE.counts)
     evaluate_inputs(inner(s, STATE.signals), t, True, inner(s, STATE.w))
     count[AGE] += 1
     if count[AGE] > MAX_AGE:
@@ -73,7 +72,7 @@ def solve_stage(m, s, o, t, c0, lam_slope):
 
 @njit(cache=True, error_model="numpy")
 def _prepare_bdf2(s, h, h1):
-    """Constants cq, cv of the step and its guess: the quadratic through y_n, y_(n-1) and ydot_n, which carries y_(n-2)."""
+    """Constants cq, cv of the step; its guess, the quadratic through y_n, y_(n-1) and ydot_n, which carries y_(n-2)."""
     q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
     q_before, v_before = floats(s, STATE.q_before), floats(s, STATE.v_before)
     cq, cv = floats(s, STATE.cq), floats(s, STATE.cv)

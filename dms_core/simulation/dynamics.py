@@ -131,7 +131,7 @@ class Simulation:
                 (self.time, float(value))
             )
             self.state.signals.c[row, 0] = value
-            self.state.countss[RESTART] = 1
+            self.state.counts[RESTART] = 1
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.

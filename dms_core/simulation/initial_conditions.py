@@ -1,4 +1,4 @@
-"""A consistent start: positions on phi = 0, velocities on phi_q v + phi_t = 0, fibres in equilibrium, independent rows."""
+"""A consistent start: q on phi = 0, v on phi_q v + phi_t = 0, states in equilibrium, independent rows."""
 
 from __future__ import annotations
 
@@ -72,8 +72,9 @@ def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
     if size > ACCEPTED:
         row = model.layout.row_names[int(np.argmax(np.abs(phi)))]
         raise AssemblyError(
-            f"system '{name}' cannot be assembled: constraint '{row}' stays open by {size:.3g} (m or -) after least-squares "
-            "assembly. Check the lengths of that loop, or declare start poses nearer to the closed position."
+            f"system '{name}' cannot be assembled: constraint '{row}' stays open by {size:.3g} (m or -) "
+            "after least-squares assembly. Check the lengths of that loop, or declare start poses nearer to the "
+            "closed one."
         )
     return q
 
@@ -112,8 +113,8 @@ def _velocities(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         worst = int(np.argmax(np.abs(correction)))
         raise AssemblyError(
             f"the declared velocities are inconsistent: constraint '{model.layout.row_names[row]}' would open at "
-            f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{model.layout.names[worst]}' from "
-            f"{v[worst]:.6g} to {v[worst] - correction[worst]:.6g}; declare velocities of all bodies of that loop together."
+            f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{model.layout.names[worst]}' "
+            f"from {v[worst]:.6g} to {v[worst] - correction[worst]:.6g}; declare all velocities of that loop."
         )
     return v - correction
 

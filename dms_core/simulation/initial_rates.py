@@ -57,7 +57,7 @@ def _correct(m, s):
         b[i] = -r2[i]
     for k in range(active.shape[0]):
         b[n + k] = -phi_a[active[k]]
-    ints(s, STATE.count)[FACTORISATIONS] += 1
+    ints(s, STATE.counts)[FACTORISATIONS] += 1
     if not factorise(m, MODEL.rate_lu, values, work) > 0.0:
         return False
     back_substitute(m, MODEL.rate_lu, values, b, x, work)
@@ -111,5 +111,5 @@ def consistent_rates(m, s):
     for k in range(lam.shape[0]):
         lam[k] = lam_before[k] = lam_w[k]
         mu[k] = 0.0
-    ints(s, STATE.count)[STALE] = 1
+    ints(s, STATE.counts)[STALE] = 1
     return True

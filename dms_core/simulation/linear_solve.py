@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from dms_core.assembly.arena import fields, floats, indices, inner, naturals, number
+from dms_core.assembly.arena import fields, indices, inner, naturals, number
 from dms_core.linear.lu import factor, solve
 from dms_core.linear.symbolic import LuTables
 

@@ -230,7 +230,7 @@ def newton(m, s, o, c0):
         x_before[:] = x
         before = norm
         if k > 0 and fresh and contraction > POOR:
-            # A kink lies between guess and solution (a fibre that stops shortening): the matrix of the far side is needed.
+            # A kink lies between guess and solution (a fibre stops shortening): the matrix of the far side is needed.
             if not refresh(m, s, c0):
                 return SINGULAR, k
         else:

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.assembly.arena import Packed, fields
-from dms_core.assembly.arena import Packed, fields
 from dms_core.assembly.sparsity import NewtonPattern, RatePattern
 from dms_core.assembly.tables import Calls, Signals, Work
 from dms_core.linear.lu import LuTables, storage
 
 # Entries of State.clock [s, unless said].
 T, H, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION = range(7)
-# Entries of State.count.
+# Entries of State.counts.
 (STEPS, REJECTED_ERROR, REJECTED_NEWTON, ITERATIONS, FACTORISATIONS, RESTARTS,
  RESTART, STALE, AGE, WORST_ROW) = range(10)  # fmt: skip
 # Entries of State.largest.
@@ -45,7 +44,7 @@ class State(NamedTuple):
     w: Work
     signals: Signals
     clock: np.ndarray
-    count: np.ndarray
+    counts: np.ndarray
     largest: np.ndarray
     q: np.ndarray
     v: np.ndarray
@@ -116,10 +115,10 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
     n, m = len(tables.second), len(w.lam)
     zeros = np.zeros
     w.q[:n], w.v[:n] = q, v
-    count = zeros(10, np.int64)
-    count[RESTART] = count[STALE] = 1
+    counts = zeros(10, np.int64)
+    counts[RESTART] = counts[STALE] = 1
     return Packed(State(
-        w, signals, zeros(7), count, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
+        w, signals, zeros(7), counts, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
         q.copy(), v.copy(), v.copy(), zeros(n), zeros(m), zeros(m), q.copy(), v.copy(), zeros(m),
         *(zeros(n) for _ in range(6)), **_linear_arrays(tables),
     ))  # fmt: skip
@@ -127,7 +126,7 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
 
 def with_tables(tables: Tables, state: State) -> Packed:
     """The same world for other rows and elimination orders: it starts afresh with least-norm multipliers unknown."""
-    state.count[RESTART] = state.count[STALE] = 1
+    state.counts[RESTART] = state.counts[STALE] = 1
     state.lam[:], state.mu[:] = 0.0, 0.0
     state.w.lam[:], state.w.mu[:] = 0.0, 0.0
-    return Packed(state._replace(**_linear_arrays(tables)))
+    return Packed(State(**{**state._asdict(), **_linear_arrays(tables)}))

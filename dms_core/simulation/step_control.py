@@ -96,8 +96,8 @@ def accept(s, h, c0, started):
     clock[H_BEFORE] = h
     largest[H_LEAST] = min(largest[H_LEAST], h)
     largest[H_MOST] = max(largest[H_MOST], h)
-    ints(s, STATE.count)[STEPS] += 1
-    ints(s, STATE.count)[RESTART] = 0
+    ints(s, STATE.counts)[STEPS] += 1
+    ints(s, STATE.counts)[RESTART] = 0
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,7 +105,7 @@ def restart(m, s, o):
     """Values just behind a jump: inputs from the right, consistent rates and multipliers; False if there are none."""
     clock = floats(s, STATE.clock)
     evaluate_inputs(inner(s, STATE.signals), clock[T], False, inner(s, STATE.w))
-    ints(s, STATE.count)[RESTARTS] += 1
+    ints(s, STATE.counts)[RESTARTS] += 1
     if not consistent_rates(m, s):
         return False
     set_weights(m, s, o)
@@ -145,7 +145,7 @@ def resize(h, error, iterations):
 @njit(cache=True, error_model="numpy")
 def one_step(m, s, o, stop):
     """Attempts until one step is accepted; gives DONE or what went wrong."""
-    clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.count), o.fixed_step > 0.0
+    clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
     started = count[RESTART] == 1
     set_weights(m, s, o)
     wanted = o.fixed_step if fixed else min(clock[H_WANTED], o.h_max)
@@ -188,13 +188,13 @@ def land(s, stop):
     jumps = floats(inner(s, STATE.signals), SIGNALS.jumps)
     for k in range(jumps.shape[0]):
         if jumps[k] == stop:
-            ints(s, STATE.count)[RESTART] = 1
+            ints(s, STATE.counts)[RESTART] = 1
 
 
 @njit(cache=True, error_model="numpy")
 def advance(m, s, o, t_end, record, recorded):
     """Step until t_end; gives (code, number of rows recorded). BUFFER_FULL asks to be called again with room."""
-    clock, count = floats(s, STATE.clock), ints(s, STATE.count)
+    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
     while clock[T] < t_end:
         if recorded + 2 > record.shape[0]:
             return BUFFER_FULL, recorded

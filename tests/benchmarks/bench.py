@@ -66,7 +66,10 @@ def tip(simulation: Simulation, links: int) -> np.ndarray:
 def bench_chain(sizes: list[int]) -> None:
     """N-link chain, 1 s at a fixed step of 1 ms."""
     print("\nChain of N links, h = 1 ms, 1 s (Exudyn: the better of its two index-2/3 solvers)")
-    print(f"{'N':>4} {'us/step':>9} {'us/link/step':>13} {'tip error m':>12} {'Exudyn us/step':>15} {'error m':>9} {'ratio':>6}")
+    print(
+        f"{'N':>4} {'us/step':>9} {'us/link/step':>13} {'tip error m':>12} "
+        f"{'Exudyn us/step':>15} {'error m':>9} {'ratio':>6}"
+    )
     for links in sizes:
         model = Model(chain(links))
 
@@ -85,7 +88,9 @@ def bench_chain(sizes: list[int]) -> None:
 def bench_precision(title: str, model: Model, angle: str, seconds: float, tolerances: list[float], peer: str) -> None:
     """Error of an angle against cost, per simulated second."""
     print(f"\n{title}\n    another program: {peer}")
-    print(f"{'rtol':>8} {'error rad':>10} {'ms CPU / s':>11} {'steps / s':>10} {'iterations':>11} {'factorisations':>15}")
+    print(
+        f"{'rtol':>8} {'error rad':>10} {'ms CPU / s':>11} {'steps / s':>10} {'iterations':>11} {'factorisations':>15}"
+    )
     grid = np.linspace(0.0, seconds, 201)
     exact = simulate(model, seconds, SolverOptions(rtol=tolerances[-1] * 1e-2)).sensors(grid)[angle]
     for rtol in tolerances:

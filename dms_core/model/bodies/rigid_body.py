@@ -8,7 +8,7 @@ Inertia terms of M vdot - f_v, with omega = 2 G(p) pdot and J about the centre o
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numba import njit
@@ -88,14 +88,16 @@ class RigidBody(Body):
     kernel: ClassVar = rigid_body
     mass: float = Field(gt=0.0, description="mass [kg]")
     inertia: tuple[float, ...] = Field(
-        description="about the centre of mass, axes of the reference frame [kg m^2]: (xx, yy, zz) or (xx, yy, zz, xy, xz, yz)"
+        description="about the centre of mass, in reference axes [kg m^2]: (xx, yy, zz) or (xx, yy, zz, xy, xz, yz)"
     )
     centre_of_mass: Vector = Field(default=(0.0, 0.0, 0.0), description="in the reference frame [m]")
     position: Vector = Field(default=(0.0, 0.0, 0.0), description="origin of the reference frame at the start [m]")
     orientation: Quaternion = Field(
         default=(1.0, 0.0, 0.0, 0.0), description="Euler parameters at the start, scalar first [-]; normalised"
     )
-    velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="of the reference origin at the start, ground axes [m/s]")
+    velocity: Vector = Field(
+        default=(0.0, 0.0, 0.0), description="of the reference origin at the start, ground axes [m/s]"
+    )
     angular_velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="at the start, ground axes [rad/s]")
 
     @field_validator("inertia")
@@ -147,4 +149,6 @@ class RigidBody(Body):
         block = np.zeros((7, 7), bool)
         block[3:, 3:] = True
         diagonal = block | np.diag([True] * 3 + [False] * 4)
-        return Placement(bodies=(self.name,), numbers=(self.mass, *self.inertia), pattern=Pattern(block, block, diagonal))
+        return Placement(
+            bodies=(self.name,), numbers=(self.mass, *self.inertia), pattern=Pattern(block, block, diagonal)
+        )

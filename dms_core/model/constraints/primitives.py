@@ -113,7 +113,7 @@ def _dot2_second(k, oi, oj, a, si, sj, q, v, lam, f, d, W, H):
 
 
 def joint_pattern(rows: str) -> ConstraintPattern:
-    """Pattern of a two-body joint from its rows: 'c' one row of a coincidence (in order x, y, z), '1' dot1, '2' dot2."""
+    """Pattern of a two-body joint from its rows: 'c' one of a coincidence (in order x, y, z), '1' dot1, '2' dot2."""
     m, n = len(rows), 14
     G, W = np.zeros((m, n), bool), np.zeros((m, n), bool)
     H = np.zeros((n, n), bool)

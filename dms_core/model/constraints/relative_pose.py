@@ -9,8 +9,7 @@ from dms_core.model.frames import rotation_matrix
 
 
 def joint_arms(system, joint) -> np.ndarray:
-    """point_i and point_j of a joint relative to the centres of mass [m], shape (6,); point_j defaults to where
-    point_i starts."""
+    """point_i and point_j (by default where point_i starts) from the centres of mass [m], shape (6,)."""
     point_j = joint.point_j
     if point_j is None:
         point_j = system.start_point(joint.body_i, joint.point_i, joint.body_j)

@@ -1,7 +1,7 @@
 """Revolute joint: two bodies share a point and an axis. Five rows.
 
-    r_i + A_i s_i - r_j - A_j s_j = 0                  (3)
-    (A_i f_i) . (A_j a_j) = 0,  (A_i g_i) . (A_j a_j) = 0      f_i, g_i perpendicular to a_i   (2)
+r_i + A_i s_i - r_j - A_j s_j = 0                  (3)
+(A_i f_i) . (A_j a_j) = 0,  (A_i g_i) . (A_j a_j) = 0      f_i, g_i perpendicular to a_i   (2)
 """
 
 from __future__ import annotations

@@ -113,7 +113,7 @@ class Pid(Force):
 
     def _check_order(self, system) -> None:
         """Start states are set in the order of declaration, and e(0) needs that of the filter."""
-        owner = self.offset.rpartition(".")[0]
+        owner = (self.offset or "").rpartition(".")[0]
         names = [force.name for force in system.forces]
         if owner in names[names.index(self.name) :]:
             raise ModelError(

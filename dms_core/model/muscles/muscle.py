@@ -170,7 +170,7 @@ class ThelenMuscle(Force):
     activation_dynamics: bool = Field(default=True, description="False: the input is the activation, without delay")
     reflex: str | None = Field(
         default=None,
-        description="coordinate x of another element, for example 'feedback.error', that adds reflex_gain x to the excitation",
+        description="coordinate x of another element ('feedback.error') that adds reflex_gain x to the excitation",
     )
     reflex_gain: float = Field(default=0.0, description="excitation per unit of the reflex coordinate [-]")
     start_activation: float = Field(

@@ -48,7 +48,11 @@ class JointReaction(Sensor):
                 )
         block = place.bodies.index(self.body)
         frame = place.bodies.index(self.frame) if self.frame in place.bodies and self.frame != GROUND else -1
-        arm = system.arm(self.body, self.point) if self.point is not None else _own_point(constraint, place, block, system)
+        arm = (
+            system.arm(self.body, self.point)
+            if self.point is not None
+            else _own_point(constraint, place, block, system)
+        )
         return Placement(
             bodies=place.bodies,
             coordinates=place.coordinates,

@@ -112,7 +112,7 @@ class RopeSensor(Sensor):
             raise ModelError(
                 f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}; a rope_force or rope_length is wanted."
             )
-        table = path_table(system, self.path if rope is None else rope.path)
+        table = path_table(system, rope.path if rope is not None else self.path or ())
         return Placement(
             bodies=table.bodies,
             integers=(CONSTANT if rope is None else MULTIPLIER, table.size, *table.integers, *codes),
