@@ -70,13 +70,25 @@ def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
             break
         q, phi, G, size = trial, phi_t, G_t, np.abs(phi_t).max()
     if size > ACCEPTED:
-        row = model.layout.row_names[int(np.argmax(np.abs(phi)))]
+        row, gap = _widest_gap(model, q)
         raise AssemblyError(
-            f"system '{name}' cannot be assembled: constraint '{row}' stays open by {size:.3g} (m or -) "
+            f"system '{name}' cannot be assembled: constraint '{row}' stays open by {gap:.3g} (m or -) "
             "after least-squares assembly. Check the lengths of that loop, or declare start poses nearer to the "
             "closed one."
         )
     return q
+
+
+def _widest_gap(model: Model, q: np.ndarray) -> tuple[str, float]:
+    """Constraint row that is open most, and by how much, with every body whole again: least squares stretches them."""
+    q = q.copy()
+    for body in model.system.bodies:
+        if body.rigid:
+            p = q[model.layout.offset[body.name] + 3 :][:4]
+            p /= np.linalg.norm(p)
+    phi = np.abs(model.constraint_jacobian(q)[0])
+    row = int(np.argmax(phi))
+    return model.layout.row_names[row], float(phi[row])
 
 
 def _rows(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

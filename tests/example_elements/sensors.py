@@ -66,3 +66,8 @@ EXAMPLES = {
     "coordinate": (coordinate,),
     "tracking": (tracking, tracking_filtered),
 }
+
+COMPOSITES = {
+    "joint_reaction": "tests/assembly/test_composite_sensors.py",
+    "joint_moment": "tests/assembly/test_composite_sensors.py",
+}

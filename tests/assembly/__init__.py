@@ -1,0 +1,1 @@
+"""The assembled system: scatter maps, start, composed sensors."""
