@@ -1,0 +1,114 @@
+"""The gym equipment (paper sect. 4.1): handle in the hand, rope of fixed length over two pulleys, sliding weight.
+
+The rope holds both ways in the equations; its tension is reported, and a negative one means a slack rope.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+from scipy.optimize import brentq
+
+from dms_core.model import GROUND, JointSpringDamper, PathPoint, Revolute, RigidBody, RopeLength, Slider
+from dms_core.model.element import Constraint, Force, Vector
+from dms_core.model.frames import quaternion, rotation_matrix
+from exo_env.human import Arm
+from exo_env.settings import Settings
+
+HANDLE, WEIGHT, ROPE, GRIP_JOINT = "handle", "weight", "gym_rope", "grip"
+
+
+class Handle(Settings):
+    """Handle that swings about the grip in the hand."""
+
+    mass: float = Field(gt=0.0, description="mass [kg]")
+    length: float = Field(gt=0.0, description="from the grip to the rope [m]")
+    centre_of_mass: float = Field(ge=0.0, description="from the grip towards the rope [m]")
+    inertia: float = Field(gt=0.0, description="about every axis through its centre of mass [kg m^2]")
+    damping: float = Field(ge=0.0, description="friction of the grip [N m s/rad]")
+
+
+class GymMachine(Settings):
+    """A machine, as in configs/gym_machine."""
+
+    handle: Handle
+    low_pulley: Vector = Field(description="in ground axes [m]")
+    high_pulley: Vector = Field(description="in ground axes [m]; the weight hangs below it")
+    weight_start: float = Field(description="height of the weight at the start [m]")
+    weight_inertia: float = Field(gt=0.0, description="inertia over mass of the weight [m^2]")
+
+
+class LoadedMachine:
+    """A machine with a weight, its handle in a hand.
+
+    Args:
+        machine: the machine.
+        arm: whose hand holds the handle.
+        mass: of the weight [kg].
+    """
+
+    def __init__(self, machine: GymMachine, arm: Arm, mass: float) -> None:
+        self.machine, self.arm, self.mass = machine, arm, mass
+
+    def rest_angle(self, flexion: float) -> float:
+        """Angle of the handle about the elbow axis, from hanging straight down, at which it rests [rad].
+
+        The rope pulls with the weight's force, the handle has its own, and the grip turns freely.
+        """
+        m, g = self.machine, np.array(self.arm.gravity)
+        grip = self.arm.elbow + self.arm.rotation(flexion) @ self.arm.grip
+
+        def moment(angle: float) -> float:
+            down = rotation_matrix(quaternion(self.arm.axis, angle)) @ (0.0, -1.0, 0.0)
+            pull = np.array(m.low_pulley) - grip - m.handle.length * down
+            tension = self.mass * np.linalg.norm(g) * pull / np.linalg.norm(pull)
+            weight = m.handle.mass * m.handle.centre_of_mass * np.cross(down, g)
+            return float(self.arm.axis @ (m.handle.length * np.cross(down, tension) + weight))
+
+        towards = np.array(m.low_pulley) - grip
+        about = float(np.arctan2(towards[0], -towards[1]))
+        return float(brentq(moment, about - 1.5, about + 1.5, xtol=1e-14))
+
+    def bodies(self, flexion: float) -> list[RigidBody]:
+        """Handle at rest in the hand of an elbow at `flexion` [rad], and the weight."""
+        m = self.machine
+        x, _, z = m.high_pulley
+        grip = self.arm.elbow + self.arm.rotation(flexion) @ self.arm.grip
+        return [
+            RigidBody(
+                name=HANDLE,
+                mass=m.handle.mass,
+                inertia=(m.handle.inertia,) * 3,
+                centre_of_mass=(0.0, -m.handle.centre_of_mass, 0.0),
+                position=tuple(grip),
+                orientation=tuple(quaternion(self.arm.axis, self.rest_angle(flexion))),
+            ),
+            RigidBody(
+                name=WEIGHT,
+                mass=self.mass,
+                inertia=(self.mass * m.weight_inertia,) * 3,
+                position=(x, m.weight_start, z),
+            ),
+        ]
+
+    def joints(self) -> list[Constraint]:
+        """Handle in the hand, weight on its rail, rope."""
+        m, axis = self.machine, tuple(self.arm.axis)
+        path = (
+            PathPoint(body=HANDLE, point=(0.0, -m.handle.length, 0.0)),
+            PathPoint(body=GROUND, point=m.low_pulley),
+            PathPoint(body=GROUND, point=m.high_pulley),
+            PathPoint(body=WEIGHT, point=(0.0, 0.0, 0.0)),
+        )
+        return [
+            Revolute(
+                name=GRIP_JOINT, body_i="forearm", body_j=HANDLE, point_i=tuple(self.arm.grip),
+                point_j=(0.0, 0.0, 0.0), axis_i=axis, axis_j=axis,
+            ),
+            Slider(name="rail", body_j=WEIGHT, axis_i=(0.0, 1.0, 0.0), point_i=(m.high_pulley[0], m.weight_start, m.high_pulley[2])),
+            RopeLength(name=ROPE, path=path),
+        ]  # fmt: skip
+
+    def forces(self) -> list[Force]:
+        """Friction of the grip."""
+        return [JointSpringDamper(name="grip_friction", joint=GRIP_JOINT, damping=self.machine.handle.damping)]
