@@ -149,6 +149,8 @@ def one_step(m, s, o, stop):
     started = count[RESTART] == 1
     set_weights(m, s, o)
     wanted = o.fixed_step if fixed else min(clock[H_WANTED], o.h_max)
+    if not fixed and wanted < o.h_min:
+        return STEP_TOO_SMALL
     if not started and not fixed:
         wanted = min(wanted, GROW * clock[H_BEFORE])
     rest = stop - clock[T]
@@ -172,6 +174,9 @@ def one_step(m, s, o, stop):
             return STEP_TOO_SMALL if code == CONVERGED else NEWTON_FAILED
     note_errors(s)
     accept(s, h, c0, started)
+    if started:
+        # Multipliers and accelerations of the start's last stage are of order 1 only; those of its q and v are of order 2.
+        consistent_rates(m, s)
     if h == rest:
         land(s, stop)
     if not fixed:
