@@ -21,18 +21,20 @@ from dms_core.simulation.state import AGE, H_BEFORE, H_BEFORE2, MODEL, STALE, ST
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 SDIRK_ERROR = 0.0404
+LOCAL_SHARE = 0.1
+"""Share of the tolerance that one step may use up: the errors of hundreds of steps add up."""
 MAX_AGE = 30
 """Stages after which a factorised matrix is renewed, however well it still contracts."""
 
 
 @njit(cache=True, error_model="numpy")
 def set_weights(m, s, o):
-    """Error weights atol + rtol |y| from the last accepted values."""
+    """Error weights, a share of atol + rtol |y|, from the last accepted values."""
     q, v, wq, wv = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.wq), floats(s, STATE.wv)
     scale_q, scale_v = floats(m, MODEL.scale_q), floats(m, MODEL.scale_v)
     for i in range(q.shape[0]):
-        wq[i] = (o.atol if o.atol > 0.0 else o.rtol * scale_q[i]) + o.rtol * abs(q[i])
-        wv[i] = (o.atol if o.atol > 0.0 else o.rtol * scale_v[i]) + o.rtol * abs(v[i])
+        wq[i] = LOCAL_SHARE * ((o.atol if o.atol > 0.0 else o.rtol * scale_q[i]) + o.rtol * abs(q[i]))
+        wv[i] = LOCAL_SHARE * ((o.atol if o.atol > 0.0 else o.rtol * scale_v[i]) + o.rtol * abs(v[i]))
 
 
 @njit(cache=True, error_model="numpy")
