@@ -1,0 +1,1 @@
+"""Problems of the literature and closed forms, solved with the whole core."""

@@ -1,0 +1,1 @@
+"""Runs in time: order of the method, events, results."""
