@@ -69,6 +69,13 @@ class PidGains(Settings):
     kd: float = Field(ge=0.0, description="[N s/rad]")
 
 
+class CriticalOscillation(Settings):
+    """What the gains follow from; documentation and Fig. 6, no part of the model."""
+
+    Kc: float = Field(gt=0.0, description="critical gain [N/rad]")
+    Tc: float = Field(gt=0.0, description="critical period [s]")
+
+
 class Misalignment(Settings):
     """How the device is worn: hinge against elbow, in the axes of the links."""
 
@@ -86,6 +93,7 @@ class Exoskeleton(Settings):
     antagonist: Rope
     guide_distance: float = Field(gt=0.0, description="from the hinge to the guided point of the forearm [m]")
     actuator: Actuator
+    tuning: CriticalOscillation
     gains: PidGains
     drift_gain: float = Field(ge=0.0, description="feedback of the error coordinate's drift [1/s]")
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from pydantic import Field
 
 from dms_core import Model, SolverOptions, Trajectory, simulate
+from dms_core.errors import InputError
 from dms_core.model import MinimumJerk
 from exo_env.ecosystem import Ecosystem, Proprioception
 from exo_env.human import Arm
@@ -99,11 +100,13 @@ def build(scenario: Scenario, exercise: Exercise, ecosystem: Ecosystem | None = 
         ecosystem: person, device and machine; weight and proprioception are set here. Default: the paper's system.
     """
     base = ecosystem or Ecosystem()
+    if base.machine is None:
+        raise InputError("a scenario needs a gym machine; this ecosystem has machine = None.")
     felt = exercise.proprioception
     scaled = felt.changed(gain=felt.gain * scenario.maximum_activation)
     joined = base.changed(weight=scenario.weight, proprioception=scaled)
     known = InternalModel(Arm(base.person), base.machine, scenario.expected_weight)
-    command = plan(known, exercise.course, exercise.duration)
+    command = _planned(known, exercise)
     system = joined.system(
         float(np.radians(exercise.angles_deg[0])),
         exercise.reference,
@@ -112,6 +115,12 @@ def build(scenario: Scenario, exercise: Exercise, ecosystem: Ecosystem | None = 
         start_activation=command.start_activation(scenario.maximum_activation),
     )
     return Model(system), command
+
+
+@lru_cache(maxsize=16)
+def _planned(model: InternalModel, exercise: Exercise) -> MotorCommand:
+    """The command; the scenarios share it as long as the subject expects the same."""
+    return plan(model, exercise.course, exercise.duration)
 
 
 def run(
