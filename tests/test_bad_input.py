@@ -179,8 +179,8 @@ class TestGeometry:
             Model(System(bodies=[rod()], forces=[rope]))
 
     def test_a_loop_that_cannot_close_names_joint_and_gap(self):
-        # Two bars of 1 m between pivots 2.5 m apart: 0.5 m are missing. The three joints of the loop share them, so that
-        # the widest gap is between a third of it and all of it.
+        # Two bars of 1 m between pivots 2.5 m apart: 0.5 m are missing. The three joints of the loop share them, so
+        # that the widest gap is between a third of it and all of it.
         left = rod("left")
         right = rod("right", position=(2.5, 0.0, 0.0))
         joints = [
