@@ -1,0 +1,166 @@
+"""How one number of a patient is spread over a population. In a file, one of:
+
+    0.8                                                              that value
+    {uniform: [0.3, 0.7]}                                            between two limits
+    {normal: {mean: 0.5, deviation: 0.1, low: 0.2, high: 0.8}}       normal, cut off at two limits
+    {log_uniform: [0.001, 0.1]}                                      uniform in the logarithm
+    {choice: [male, female], weights: [1, 2]}                        one of several; equal weights unless given
+
+Each takes exactly one uniform number from 0 to 1 and returns its quantile, so that a field's spread changes no other.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pydantic import Field, model_validator
+from scipy.special import ndtr, ndtri
+
+from dms_core.errors import InputError, choices
+from exo_env.settings import Settings
+
+Value = float | str
+
+
+class Constant(Settings):
+    """The same for all."""
+
+    constant: Value
+
+    def limits(self) -> tuple[Value, ...]:
+        """Every value, or the least and the greatest."""
+        return (self.constant,)
+
+    def quantile(self, _: float) -> Value:
+        """The value."""
+        return self.constant
+
+
+class Uniform(Settings):
+    """Between two limits."""
+
+    uniform: tuple[float, float] = Field(description="least and greatest value")
+
+    @model_validator(mode="after")
+    def _ordered(self):
+        if self.uniform[0] > self.uniform[1]:
+            raise ValueError(f"uniform = {list(self.uniform)}: the first limit must not be above the second")
+        return self
+
+    def limits(self) -> tuple[Value, ...]:
+        """The least and the greatest value."""
+        return self.uniform
+
+    def quantile(self, p: float) -> Value:
+        """Value at a probability."""
+        low, high = self.uniform
+        return low + p * (high - low)
+
+
+class LogUniform(Settings):
+    """Between two positive limits, uniform in the logarithm."""
+
+    log_uniform: tuple[float, float] = Field(description="least and greatest value, above 0")
+
+    @model_validator(mode="after")
+    def _ordered(self):
+        low, high = self.log_uniform
+        if not 0.0 < low <= high:
+            raise ValueError(f"log_uniform = {[low, high]}: two numbers above 0 in rising order are wanted")
+        return self
+
+    def limits(self) -> tuple[Value, ...]:
+        """The least and the greatest value."""
+        return self.log_uniform
+
+    def quantile(self, p: float) -> Value:
+        """Value at a probability; rounding does not leave the limits."""
+        low, high = self.log_uniform
+        return min(max(low * math.exp(p * math.log(high / low)), low), high)
+
+
+class Truncated(Settings):
+    """Numbers of a normal distribution that is cut off at two limits."""
+
+    mean: float = Field(description="of the distribution before it is cut")
+    deviation: float = Field(gt=0.0, description="standard deviation before it is cut")
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _ordered(self):
+        if not self.low < self.high:
+            raise ValueError(f"low = {self.low} and high = {self.high}: low must be below high")
+        if self.mean + 5.0 * self.deviation < self.low or self.mean - 5.0 * self.deviation > self.high:
+            raise ValueError(f"mean = {self.mean} is more than five deviations outside of {self.low} to {self.high}")
+        return self
+
+
+class Normal(Settings):
+    """Normal, cut off at two limits."""
+
+    normal: Truncated
+
+    def limits(self) -> tuple[Value, ...]:
+        """The least and the greatest value."""
+        return (self.normal.low, self.normal.high)
+
+    def quantile(self, p: float) -> Value:
+        """Value at a probability."""
+        n = self.normal
+        low, high = ndtr((n.low - n.mean) / n.deviation), ndtr((n.high - n.mean) / n.deviation)
+        return min(max(n.mean + n.deviation * float(ndtri(low + p * (high - low))), n.low), n.high)
+
+
+class Choice(Settings):
+    """One of several."""
+
+    choice: tuple[Value, ...] = Field(min_length=1)
+    weights: tuple[float, ...] | None = Field(default=None, description="relative, one for each; None: equal")
+
+    @model_validator(mode="after")
+    def _weighted(self):
+        w = self.weights
+        if w is not None and (len(w) != len(self.choice) or min(w) < 0.0 or sum(w) <= 0.0):
+            raise ValueError(f"weights = {list(w)}: one number from 0 for each of {list(self.choice)} is wanted, not all 0")
+        return self
+
+    def limits(self) -> tuple[Value, ...]:
+        """Every value."""
+        return self.choice
+
+    def quantile(self, p: float) -> Value:
+        """Value at a probability."""
+        return self.choice[weighted(self.weights or (1.0,) * len(self.choice), p)]
+
+
+Distribution = Constant | Uniform | LogUniform | Normal | Choice
+KINDS: dict[str, type[Distribution]] = {
+    "uniform": Uniform, "log_uniform": LogUniform, "normal": Normal, "choice": Choice,
+}  # fmt: skip
+
+
+def weighted(weights: tuple[float, ...], p: float) -> int:
+    """Number of the interval in which a probability falls, the intervals being in proportion to the weights."""
+    total, reached = sum(weights), 0.0
+    for k, w in enumerate(weights):
+        reached += w
+        if p * total < reached:
+            return k
+    return max(k for k, w in enumerate(weights) if w > 0.0)
+
+
+def distribution(spec: Any) -> Distribution:
+    """A distribution from what stands in a file.
+
+    Raises:
+        InputError: it is none; says what would be.
+    """
+    if isinstance(spec, str) or (isinstance(spec, int | float) and not isinstance(spec, bool)):
+        return Constant(constant=spec)
+    if isinstance(spec, dict):
+        for kind, cls in KINDS.items():
+            if kind in spec:
+                return cls(**spec)
+    raise InputError(f"{spec!r} is no distribution; a value or one of {choices(KINDS)} is wanted.")
