@@ -32,6 +32,10 @@ from pydantic import Field, model_validator
 from dms_core.model.control.pid import Pid
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 
+NOMINAL_TENSION = 100.0
+"""Size of a rope drive's tension [N], for the error test: a controller of high gain turns angle errors of 1e-8 rad into
+tenths of a newton, and a tolerance of a newton's fraction would let that ripple dictate the step."""
+
 
 @njit(cache=True)
 def positive_part(x, width):
@@ -119,7 +123,8 @@ class RopeActuator(Force):
     def coordinates(self) -> tuple[Coordinate, ...]:
         """The tension, a first-order state; sizes are a newton and a newton in T."""
         start = self.pretension if self.start_tension is None else self.start_tension
-        return (Coordinate("tension", start, rate_scale=1.0 / self.time_constant, differential_rate=False),)
+        rate_scale = NOMINAL_TENSION / self.time_constant
+        return (Coordinate("tension", start, scale=NOMINAL_TENSION, rate_scale=rate_scale, differential_rate=False),)
 
     def input_names(self) -> tuple[str, ...]:
         """The command or the authority."""
