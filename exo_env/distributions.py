@@ -1,4 +1,6 @@
-"""How one number of a patient is spread over a population. In a file, one of:
+"""How one number of a patient is spread over a population.
+
+In a file, one of:
 
     0.8                                                              that value
     {uniform: [0.3, 0.7]}                                            between two limits
@@ -123,7 +125,9 @@ class Choice(Settings):
     def _weighted(self):
         w = self.weights
         if w is not None and (len(w) != len(self.choice) or min(w) < 0.0 or sum(w) <= 0.0):
-            raise ValueError(f"weights = {list(w)}: one number from 0 for each of {list(self.choice)} is wanted, not all 0")
+            raise ValueError(
+                f"weights = {list(w)}: one number from 0 for each of {list(self.choice)} is wanted, not all 0"
+            )
         return self
 
     def limits(self) -> tuple[Value, ...]:

@@ -269,5 +269,7 @@ def _activations(wanted: np.ndarray) -> np.ndarray:
     """Checked: six finite numbers from 0 to 1."""
     found = np.asarray(wanted, dtype=float)
     if found.shape != (N,) or not np.all((found >= 0.0) & (found <= 1.0)):
-        raise InputError(f"wanted = {wanted!r}; {N} activations from 0 to 1 are wanted, in the order {', '.join(MUSCLES)}.")
+        raise InputError(
+            f"wanted = {wanted!r}; {N} activations from 0 to 1 are wanted, in the order {', '.join(MUSCLES)}."
+        )
     return found

@@ -5,11 +5,11 @@ how each number acts; configs/patients says how it is distributed. The source of
 description as one of these labels, or as the word "assumed"; a range is a limit of what is accepted, not a
 distribution.
 
-    [Bazzucchi 2006]  Muscle Nerve 33:191-199: antagonist activity of biceps and triceps in elbow movements
+    [Bazzucchi 2006]  Muscle Nerve, doi:10.1002/mus.20462: antagonist activity of biceps and triceps in elbow movements
     [Bowden 2014]     Front. Neurol. 5:239: elbow flexor torque and voluntary activation after stroke
     [Canning 1999]    Arch. Phys. Med. Rehabil. 80:66-70: elbow torque after stroke, its size and its rate
     [Cavanagh 1979]   Eur. J. Appl. Physiol. 42:159-163: electromechanical delay of the elbow flexors
-    [Deuschl 2022]    Clin. Neurophysiol. 136:93-129: investigation of tremor
+    [Deuschl 2022]    Clin. Neurophysiol., doi:10.1016/j.clinph.2022.01.004: investigation of tremor
     [Elble 2000]      Neurology 55:1547-1551: frequency of essential tremor
     [Emken 2007]      J. Neurophysiol. 97:3997-4006: motor adaptation as greedy optimisation of error and effort
     [Frey-Law 2012]   J. Biomech. 45:1803-1808: fatigue and recovery rates of six joints
@@ -18,9 +18,11 @@ distribution.
     [Looft 2018]      J. Biomech. 77:16-25: recovery multiplier at rest
     [McPherson 2018]  Exp. Brain Res. 237:121-135: elbow stretch reflex in hemiparesis, stretches of 15 to 150 deg/s
     [Mercier 2004]    Clin. Rehabil. 18:215-221: relative strength of five muscle groups of the paretic arm
-    [Rakshit 2021]    J. Biomech. 127:110695: fatigue and recovery rates by muscle group and sex
+    [Rakshit 2021]    doi:10.1016/j.jbiomech.2021.110695: fatigue and recovery rates by muscle group and sex
     [Wolbrecht 2008]  IEEE Trans. Neural Syst. Rehabil. Eng. 16:286-297: people after stroke let the robot do the work
-    [Xia 2008]        J. Biomech. 41:3046-3052: the three-compartment fatigue model
+
+Most of these numbers stand in the abstracts. Not checked against the papers themselves: the elbow's rates of
+[Frey-Law 2012], the latency of [Hammond 1955]; the rates of [Rakshit 2021] are those that MyoSuite quotes from it.
 """
 
 from __future__ import annotations
@@ -86,8 +88,8 @@ class Patient(Settings):
     )
     stretch_threshold: float = Field(
         default=0.5, ge=0.0, le=10.0,
-        description="rate of stretch, as rate of the elbow, below which there is no reflex [rad/s]; assumed, within the "
-        "0.26 to 2.6 rad/s at which the paretic elbow's reflex is tested [McPherson 2018]",
+        description="rate of stretch, as rate of the elbow, below which there is no reflex [rad/s]; assumed, within "
+        "the 0.26 to 2.6 rad/s at which the paretic elbow's reflex is tested [McPherson 2018]",
     )  # fmt: skip
     stretch_delay: float = Field(
         default=0.03, ge=0.0, le=LONGEST_DELAY,

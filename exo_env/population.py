@@ -156,8 +156,8 @@ def population(source: Source) -> Population:
             return Population(**source)
         return population(Patient(**source))
     raise InputError(
-        f"patient = {source!r}; a population ({choices(shipped_populations())}), a YAML file, or a mapping of the fields "
-        "of a patient is wanted."
+        f"patient = {source!r}; a population ({choices(shipped_populations())}), a YAML file, or a mapping of the "
+        "fields of a patient is wanted."
     )
 
 

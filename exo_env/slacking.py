@@ -1,9 +1,9 @@
 """Slacking: a patient does less when the device does the work and nothing is lost by it.
 
 Emken et al. (2007, J. Neurophysiol. 97:3997-4006) found effort from one movement to the next to be f u + g e with a
-forgetting factor f < 1, and Reinkensmeyer, Wolbrecht and Bobrow (2007, IEEE EMBS 29:4019-4023) and Wolbrecht et al.
-(2008, IEEE TNSRE 16:286-297) the same of people after stroke in a robot that lifts their arm. Here with a rate, for
-the effort s as a share of the command:
+forgetting factor f < 1; Reinkensmeyer, Wolbrecht and Bobrow (2007, doi:10.1109/IEMBS.2007.4353215) and Wolbrecht et
+al. (2008, IEEE TNSRE 16:286-297) found the same of people after stroke in a robot that lifts their arm. Here
+with a rate, for the effort s as a share of the command:
 
     s' = -A (s - s_0) + B (1 - s)
     A = rate w(e) share,   w = 1 for e <= 0, 1 - e / tolerance below the tolerance, 0 beyond
