@@ -135,7 +135,11 @@ def test_reflex_is_not_weakened_and_stays_within_the_limits():
 
 def test_tremor_is_a_sine_in_opposite_phase():
     n, f = 500, 4.0
-    found = _course(_effort(tremor_amplitude=0.05, tremor_frequency=f, fatigue_rate=0.0), np.full((n, 6), 0.4)) - 0.4
+    effort = _effort(tremor_amplitude=0.05, tremor_frequency=f)
+    found = _course(effort, np.full((n, 6), 0.4)) - 0.4
+    # After 40 whole cycles the phase is that of the start; the value held is that of the middle of the period.
+    start = effort.state[STATE.phase]
+    assert found[0, 3] == pytest.approx(0.05 * np.sin(start + np.pi * f * PERIOD), abs=1e-12)
     np.testing.assert_allclose(found[:, 3], -found[:, 0], rtol=0.0, atol=1e-14)
     spectrum = np.abs(np.fft.rfft(found[:, 3])) * 2.0 / n
     peak = round(f * n * PERIOD)
