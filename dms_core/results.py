@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,10 +80,14 @@ class Trajectory:
         self.model, self.signals = model, signals
         self.t = record[:, 0].copy()
         self.q, self.v, self.a = (record[:, 1 + k * n : 1 + (k + 1) * n].copy() for k in range(3))
-        self.lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
+        self._lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
         self.mu = record[:, 1 + 3 * n + m :].copy()
         self.result, self.stats, self.message = result, stats, message
-        model.make_multipliers_unique(self.q, self.lam)
+
+    @cached_property
+    def lam(self) -> np.ndarray:
+        """Multipliers, shape (n, n_phi); computed when asked for, as making them unique takes longer than a step."""
+        return self.model.unique_multipliers(self.q, self._lam)
 
     @property
     def success(self) -> bool:
@@ -122,9 +127,11 @@ class Trajectory:
         second = self.model.second_order
         q, slope_q, _ = _hermite(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
         v, slope_v, _ = _hermite(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
-        line = lambda y: (1.0 - x) * y[start] + x * y[end]  # noqa: E731
+        unique = self.model.unique_multipliers
+        lam = (1.0 - x) * unique(self.q[start], self._lam[start]) + x * unique(self.q[end], self._lam[end])
+        mu = (1.0 - x) * self.mu[start] + x * self.mu[end]
         v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
-        return States(self.model, self.signals, times, q, v, a, line(self.lam), line(self.mu))
+        return States(self.model, self.signals, times, q, v, a, lam, mu)
 
     def own_steps(self) -> States:
         """States on the solver's own steps."""

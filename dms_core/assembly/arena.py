@@ -15,8 +15,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import carray, njit, types
+from numba import carray, types
 from numba.extending import intrinsic
+
+from dms_core.jit import compiled
 
 
 def fields(kind: type) -> Any:
@@ -72,49 +74,49 @@ _uint32 = _pointer_to(types.uint32)
 _bool = _pointer_to(types.boolean)
 
 
-@njit(cache=True)
+@compiled
 def floats(table, k):
     """Field k as a vector of floats."""
     return carray(_float64(table[k, 0]), (table[k, 1],))
 
 
-@njit(cache=True)
+@compiled
 def matrix(table, k):
     """Field k as a matrix of floats."""
     return carray(_float64(table[k, 0]), (table[k, 1], table[k, 2]))
 
 
-@njit(cache=True)
+@compiled
 def ints(table, k):
     """Field k as a vector of 64-bit integers."""
     return carray(_int64(table[k, 0]), (table[k, 1],))
 
 
-@njit(cache=True)
+@compiled
 def indices(table, k):
     """Field k as a vector of 32-bit integers."""
     return carray(_int32(table[k, 0]), (table[k, 1],))
 
 
-@njit(cache=True)
+@compiled
 def naturals(table, k):
     """Field k as a vector of unsigned 32-bit integers."""
     return carray(_uint32(table[k, 0]), (table[k, 1],))
 
 
-@njit(cache=True)
+@compiled
 def flags(table, k):
     """Field k as a vector of booleans."""
     return carray(_bool(table[k, 0]), (table[k, 1],))
 
 
-@njit(cache=True)
+@compiled
 def inner(table, k):
     """Field k as the table of a nested tuple."""
     return carray(_int64(table[k, 0]), (table[k, 1], table[k, 2]))
 
 
-@njit(cache=True)
+@compiled
 def number(table, k):
     """Field k as a whole number."""
     return table[k, 1]

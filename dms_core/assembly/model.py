@@ -10,7 +10,13 @@ import numpy as np
 
 from dms_core.assembly.arena import Packed
 from dms_core.assembly.layout import Layout
-from dms_core.assembly.residual import dense_constraints, evaluate_inputs, evaluate_newton, evaluate_rates
+from dms_core.assembly.residual import (
+    dense_constraints,
+    dense_jacobians,
+    evaluate_inputs,
+    evaluate_newton,
+    evaluate_rates,
+)
 from dms_core.assembly.sensing import Partials, composition, evaluate_partials, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
 from dms_core.assembly.tables import Signals, Work, all_calls, new_work, signal_tables
@@ -19,7 +25,7 @@ from dms_core.errors import ModelError
 from dms_core.linear.lu import assemble as assemble_lu
 from dms_core.linear.lu import factor, storage
 from dms_core.linear.ordering import SingularMatrixError
-from dms_core.linear.rank import independent_rows, minimum_norm
+from dms_core.linear.rank import independent_rows, minimum_norms
 from dms_core.linear.symbolic import LuTables, plan
 from dms_core.model.system import System
 from dms_core.simulation.initial_conditions import Start, assemble
@@ -27,6 +33,9 @@ from dms_core.simulation.state import Tables, new_state
 
 TYPICAL_C0 = 1.5e3
 """c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen."""
+
+BATCH = 256
+"""States whose multipliers are made unique at a time."""
 
 NEARBY_STATES, NEARBY = 6, 0.1
 """Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
@@ -223,16 +232,21 @@ class Model:
         dense_constraints(self._constraints.table, packed.table, G, W)
         return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]
 
-    def make_multipliers_unique(self, q: np.ndarray, lam: np.ndarray) -> None:
-        """Replace each row of lam by the least-norm multipliers of the same constraint force phi_q^T lam.
+    def unique_multipliers(self, q: np.ndarray, lam: np.ndarray) -> np.ndarray:
+        """The least-norm multipliers of the same constraint force phi_q^T lam, shapes (k, n_q) and (k, n_phi).
 
         With redundant constraints only the force is determined, not its share per joint; the least norm is a
         convention, and a reaction read from it is one of many possible ones.
         """
         if not len(self.start.redundant):
-            return
-        for k in range(len(q)):
-            lam[k] = minimum_norm(self.constraint_jacobian(q[k])[2], lam[k])
+            return lam
+        unique, w = np.empty_like(lam), Packed(self.new_work())
+        for k in range(0, len(q), BATCH):
+            some = np.ascontiguousarray(q[k : k + BATCH])
+            G = np.zeros((len(some), self.n_phi, self.n_q + 7))
+            dense_jacobians(self._constraints.table, w.table, some, G)
+            unique[k : k + BATCH] = minimum_norms(G[:, :, : self.n_q], lam[k : k + BATCH])
+        return unique
 
     def measure(self, signals: Signals, t, q, v, a, lam, behind) -> np.ndarray:  # noqa: ANN001
         """Sensors at given states with the given inputs: shape (k, n_y); behind[k] takes inputs behind a jump."""

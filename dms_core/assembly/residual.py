@@ -5,18 +5,17 @@ r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi 
 
 import math
 
-from numba import njit
-
 from dms_core.assembly.arena import fields, floats, indices, inner, ints, matrix
 from dms_core.assembly.calls import call_constraint, call_dynamic, call_sensor, call_signal
 from dms_core.assembly.sparsity import NewtonPattern, Part, RatePattern
 from dms_core.assembly.tables import FUNCTION, HARMONIC, Calls, Signals, Work
+from dms_core.jit import compiled
 
 CALLS, WORK, SIGNALS, PART = fields(Calls), fields(Work), fields(Signals), fields(Part)
 NEWTON, RATES = fields(NewtonPattern), fields(RatePattern)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _piece(t, starts, first, end, before):
     """Index of the polynomial piece that holds at t; `before` takes the one on the left at its start."""
     low, high = first, end
@@ -29,7 +28,7 @@ def _piece(t, starts, first, end, before):
     return low
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_inputs(signals, t, before, w):
     """u[k] = value, first and second derivative of input k at t; `before` takes the limit from the left at a jump."""
     u, kind, ptr = matrix(w, WORK.u), ints(signals, SIGNALS.kind), ints(signals, SIGNALS.ptr)
@@ -52,7 +51,7 @@ def evaluate_inputs(signals, t, before, w):
             u[k, 2] = 2.0 * c[i, 2] + s * (6.0 * c[i, 3] + s * (12.0 * c[i, 4] + s * 20.0 * c[i, 5]))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def gather(calls, e, w):
     """Copy the local q, v, vdot and inputs of call e; gives the number of local coordinates."""
     iq, ptr = indices(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)
@@ -72,21 +71,21 @@ def gather(calls, e, w):
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def integers_of(calls, e):
     """Integers of call e."""
     ptr = ints(calls, CALLS.ip_ptr)
     return indices(calls, CALLS.ip)[ptr[e] : ptr[e + 1]]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def numbers_of(calls, e):
     """Numbers of call e."""
     ptr = ints(calls, CALLS.par_ptr)
     return floats(calls, CALLS.par)[ptr[e] : ptr[e + 1]]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _clear(block, m, n):
     """block[:m, :n] = 0."""
     for i in range(m):
@@ -94,7 +93,7 @@ def _clear(block, m, n):
             block[i, j] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_dynamic(calls, e, w, level):
     """Run the dynamic kernel of call e into r_l and, for level 1, Jq, Jv, Ja; gives n."""
     n = gather(calls, e, w)
@@ -113,7 +112,7 @@ def evaluate_dynamic(calls, e, w, level):
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_constraint(calls, e, w, level):
     """Run the constraint kernel of call e into phi_l, phi_t_l, G and, for level 1, W, H; gives n."""
     n = gather(calls, e, w)
@@ -137,7 +136,7 @@ def evaluate_constraint(calls, e, w, level):
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def add_constraint_values(calls, e, w, n):
     """Rows of phi and phi_q v + phi_t of call e, from its local arrays."""
     rows = ints(calls, CALLS.row)
@@ -156,7 +155,7 @@ def add_constraint_values(calls, e, w, n):
         phi_v[rows[e] + k] = rate
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def add_constraint_forces(calls, e, w, n):
     """phi_q^T lam into r2 and phi_q^T mu into gmu, of call e."""
     rows, iq, start = ints(calls, CALLS.row), indices(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)[e]
@@ -170,7 +169,7 @@ def add_constraint_forces(calls, e, w, n):
             gmu[iq[start + i]] += G[k, i] * y
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_constraints(calls, w):
     """phi and phi_q v + phi_t of all rows, without derivatives."""
     for e in range(ints(calls, CALLS.kernel).shape[0]):
@@ -178,7 +177,7 @@ def evaluate_constraints(calls, w):
         add_constraint_values(calls, e, w, n)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _add_dynamic_rows(calls, e, w, n):
     """r2 += r_l of call e."""
     r2, r_l, iq, start = floats(w, WORK.r2), floats(w, WORK.r_l), indices(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)[e]
@@ -186,7 +185,7 @@ def _add_dynamic_rows(calls, e, w, n):
         r2[iq[start + i]] += r_l[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_residual(dynamics, constraints, w):
     """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, without derivatives."""
     floats(w, WORK.r2)[:] = 0.0
@@ -200,7 +199,7 @@ def evaluate_residual(dynamics, constraints, w):
         add_constraint_forces(constraints, e, w, n)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _scatter(part, e, local, factor, values):
     """values[slot] += factor local[i, j] for the entries of call e."""
     i, j, slot, ptr = indices(part, PART.i), indices(part, PART.j), indices(part, PART.slot), ints(part, PART.ptr)
@@ -208,7 +207,7 @@ def _scatter(part, e, local, factor, values):
         values[slot[k]] += factor * local[i[k], j[k]]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
     """As evaluate_residual, and the scaled Newton matrix into `values` (see sparsity.newton_pattern)."""
     floats(w, WORK.r2)[:] = 0.0
@@ -241,7 +240,7 @@ def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
         _scatter(inner(pattern, NEWTON.H), e, H, h * h, values)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_rates(dynamics, constraints, pattern, w, values):
     """r2, phi_a and the matrix of the acceleration problem (see sparsity.rate_pattern)."""
     floats(w, WORK.r2)[:] = 0.0
@@ -262,7 +261,7 @@ def evaluate_rates(dynamics, constraints, pattern, w, values):
         _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _add_acceleration_rows(calls, e, w, n):
     """phi_a = phi_q vdot + (phi_q v)_q v + phi_tt of call e."""
     rows, phi_a, phi_t_l = ints(calls, CALLS.row), floats(w, WORK.phi_a), matrix(w, WORK.phi_t_l)
@@ -274,7 +273,7 @@ def _add_acceleration_rows(calls, e, w, n):
         phi_a[rows[e] + k] = x
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def dense_constraints(constraints, w, G, W):
     """phi, phi_v and dense phi_q, (phi_q v)_q, shapes (n_phi, n_q + 7)."""
     G[:, :] = 0.0
@@ -290,7 +289,23 @@ def dense_constraints(constraints, w, G, W):
                 W[rows[e] + k, iq[ptr[e] + i]] += W_l[k, i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def dense_jacobians(constraints, w, q, G):
+    """phi_q at each of the positions q, shapes (k, n_q) and (k, n_phi, n_q + 7)."""
+    G[:, :, :] = 0.0
+    G_l, q_w, iq = matrix(w, WORK.G), floats(w, WORK.q), indices(constraints, CALLS.iq)
+    ptr, rows = ints(constraints, CALLS.iq_ptr), ints(constraints, CALLS.row)
+    for k in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            q_w[i] = q[k, i]
+        for e in range(ints(constraints, CALLS.kernel).shape[0]):
+            n = evaluate_constraint(constraints, e, w, 0)
+            for m in range(rows[e + 1] - rows[e]):
+                for i in range(n):
+                    G[k, rows[e] + m, iq[ptr[e] + i]] += G_l[m, i]
+
+
+@compiled
 def evaluate_sensor(sensors, e, first, end, w, level):
     """Run the sensor kernel of call e into y_l and, for level 1, its derivatives; lam[first:end] is handed in."""
     n = gather(sensors, e, w)

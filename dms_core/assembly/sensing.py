@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dms_core.assembly.arena import fields, floats, indices, ints, matrix
 from dms_core.assembly.layout import Layout
@@ -23,6 +22,7 @@ from dms_core.assembly.residual import (
     integers_of,
     numbers_of,
 )
+from dms_core.jit import compiled
 from dms_core.model.rotations import (
     add,
     add_gradient,
@@ -74,7 +74,7 @@ def composition(layout: Layout) -> Composition:
     return Composition(np.array(which, np.int64), np.array([k for x in lists for k in x], np.int64), ptr)
 
 
-@njit(cache=True)
+@compiled
 def ground_moment(x, o, Q, k):
     """E(p) Q_p / 2 for the Euler parameters in x[o + 3 : o + 7] and Q_p = Q[k : k + 4]."""
     p = euler_parameters(x, o)
@@ -82,14 +82,14 @@ def ground_moment(x, o, Q, k):
     return scale(0.5, add(add(scale(-Q[k], e), scale(p[0], y)), cross(e, y)))
 
 
-@njit(cache=True)
+@compiled
 def axis_of(q, frame, i):
     """Axis i of the body at offset `frame` in ground axes; of the ground itself for -1."""
     unit = (1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2))
     return rotated(q, frame, unit) if frame >= 0 else unit
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _constraint_load(calls, e, w, o):
     """Q = -(phi_q^T lam) on the body at local offset o, into r_l[0:7]."""
     r_l, G, lam_l, rows = floats(w, WORK.r_l), matrix(w, WORK.G), floats(w, WORK.lam_l), ints(calls, CALLS.row)
@@ -99,7 +99,7 @@ def _constraint_load(calls, e, w, o):
             r_l[i] -= G[k, o + i] * lam_l[k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def reaction(constraints, sensors, e, w, c):
     """Sensor e, reaction of constraint call c: values into y_l."""
     evaluate_constraint(constraints, c, w, 0)
@@ -114,7 +114,7 @@ def reaction(constraints, sensors, e, w, c):
         y_l[i], y_l[3 + i] = dot(axis, force), dot(axis, moment)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _turn_partials(q, frame, row, column, force, moment, into):
     """into[row : row + 6, column] += the derivative (force, moment) given in ground axes, turned into the frame."""
     for i in range(3):
@@ -123,7 +123,7 @@ def _turn_partials(q, frame, row, column, force, moment, into):
         into[row + 3 + i, column] += dot(axis, moment)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def reaction_partials(constraints, sensors, e, w, c, by_q, by_lam):
     """Derivatives of the reaction by q and lam, scattered into the dense partials."""
     n = evaluate_constraint(constraints, c, w, 1)
@@ -156,7 +156,7 @@ def reaction_partials(constraints, sensors, e, w, c, by_q, by_lam):
         _frame_partials(w, n, frame, row, force, moment, iq[first : first + n], by_q)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _frame_partials(w, n, frame, row, force, moment, columns, by_q):
     """What the turning of the frame itself adds."""
     Yq, q = matrix(w, WORK.G), floats(w, WORK.q_l)
@@ -170,7 +170,7 @@ def _frame_partials(w, n, frame, row, force, moment, columns, by_q):
                 by_q[k, columns[j]] += Yq[0, j]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _is_distal(sensors, e, body):
     """True if the body that starts at global coordinate `body` is one of sensor e's distal bodies."""
     iq, ptr = indices(sensors, CALLS.iq), ints(sensors, CALLS.iq_ptr)
@@ -180,7 +180,7 @@ def _is_distal(sensors, e, body):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _joint(sensors, e, w):
     """(axis, centre) of sensor e's joint in ground axes; leaves the proximal body in q_l[0:7]."""
     q, q_l, par = floats(w, WORK.q), floats(w, WORK.q_l), numbers_of(sensors, e)
@@ -190,7 +190,7 @@ def _joint(sensors, e, w):
     return rotated(q_l, 0, vec(par, 3)), point(q_l, 0, vec(par, 0))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def joint_moment(dynamics, sensors, e, w, sources):
     """Sensor e, moment of the dynamic calls in `sources`: value into y_l[0]."""
     axis, centre = _joint(sensors, e, w)
@@ -210,7 +210,7 @@ def joint_moment(dynamics, sensors, e, w, sources):
     floats(w, WORK.y_l)[0] = total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _moment_of_column(J, j, o, q, lever, axis):
     """Moment about the axis of the generalised load J[o : o + 7, j] on the body at offset o."""
     force, p = (J[o, j], J[o + 1, j], J[o + 2, j]), euler_parameters(q, o)
@@ -219,7 +219,7 @@ def _moment_of_column(J, j, o, q, lever, axis):
     return dot(axis, add(cross(lever, force), moment))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _own_partials(w, o, columns, axis, force, row, by_q):
     """By the position and the Euler parameters of the loaded body itself."""
     r, about = floats(w, WORK.r_l), cross(force, axis)
@@ -232,7 +232,7 @@ def _own_partials(w, o, columns, axis, force, row, by_q):
         by_q[row, columns[o + 3 + i]] -= 0.5 * dot(axis, d)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def joint_moment_partials(dynamics, sensors, e, w, sources, by_q, by_v, by_a):
     """Derivatives of the moment by q, v and vdot, scattered into the dense partials."""
     row, par = ints(sensors, CALLS.row)[e], numbers_of(sensors, e)
@@ -270,21 +270,21 @@ def joint_moment_partials(dynamics, sensors, e, w, sources, by_q, by_v, by_a):
         by_q[row, iq[start + j]] += Yq[0, j]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _sources(composed, e):
     """Dynamic calls that sensor e sums."""
     ptr = ints(composed, COMPOSITION.source_ptr)
     return ints(composed, COMPOSITION.source)[ptr[e] : ptr[e + 1]]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _multipliers(constraints, c):
     """First and last row of constraint call c; an empty range for -1."""
     rows = ints(constraints, CALLS.row)
     return (rows[c], rows[c + 1]) if c >= 0 else (0, 0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_sensors(dynamics, constraints, sensors, composed, w):
     """All sensors at the state in w, into w.y."""
     kernels, rows, which = ints(sensors, CALLS.kernel), ints(sensors, CALLS.row), ints(composed, COMPOSITION.constraint)
@@ -301,7 +301,7 @@ def evaluate_sensors(dynamics, constraints, sensors, composed, w):
             y[rows[e] + i] = y_l[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
     """Derivatives of all sensors at the state in w; `into`, a packed Partials, must be zero."""
     kernels, rows, which = ints(sensors, CALLS.kernel), ints(sensors, CALLS.row), ints(composed, COMPOSITION.constraint)
@@ -334,7 +334,7 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
                 by_u[row, iu[u_ptr[e] + j]] += Yu[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def measure(dynamics, constraints, sensors, composed, signals, w, t, q, v, a, lam, behind, y):
     """y[k] at the states q[k], v[k], a[k], lam[k], t[k]; behind[k] takes the inputs behind a jump at t[k]."""
     q_w, v_w, a_w, lam_w, y_w = (

@@ -10,8 +10,8 @@ its place. Everything is compiled to be called from compiled code; the same inpu
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from dms_core.jit import compiled
 from dms_core.linear.lanes import WIDTH, dot, eliminate, subtract
 from dms_core.linear.symbolic import LuTables
 
@@ -33,7 +33,7 @@ def storage(length: int, worlds: int | None = None) -> np.ndarray:
     return block[0] if worlds is None else block
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def factor(tables, a, work):
     """Factors in place; returns (smallest relative pivot, its step).
 
@@ -74,7 +74,7 @@ def factor(tables, a, work):
     return smallest, where
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def solve(tables, a, b, x, work):
     """x of A x = b from the factors in a; b and x may be the same array.
 
@@ -108,7 +108,7 @@ def solve(tables, a, b, x, work):
         x[tables.col_of[k]] = y
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def solve_transposed(tables, a, b, x, work):
     """x of A^T x = b from the factors of A in a; arguments as in solve."""
     n = tables.n
@@ -134,7 +134,7 @@ def solve_transposed(tables, a, b, x, work):
             subtract(work, _U(tables.group[p >> _BLOCK]), a, p, y)
 
 
-@njit(cache=True)
+@compiled
 def residual(rows, cols, values, b, x, r):
     """r = b - A x from the entries of A; a check on a factorisation, and the start of a refinement step."""
     r[:] = b
@@ -142,7 +142,7 @@ def residual(rows, cols, values, b, x, r):
         r[rows[e]] -= values[e] * x[cols[e]]
 
 
-@njit(cache=True)
+@compiled
 def assemble(tables, values, a):
     """Writes a matrix given as entries, in the order of tables.position, into the storage array a."""
     a[:] = 0.0

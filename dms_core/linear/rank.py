@@ -16,6 +16,10 @@ RANK_TOLERANCE = 1e-9
 """Of the largest singular value of the normalised rows; kinematic rows are exact to about 1e-14."""
 
 
+SHIFT, REFINEMENTS = 1e-9, 4
+"""Of minimum_norms; singular values down to 1e-3 of the largest are then treated to about 1e-12."""
+
+
 class RowRank(NamedTuple):
     """What independent_rows finds."""
 
@@ -87,3 +91,21 @@ def minimum_norm(G: np.ndarray, lam: np.ndarray, tol: float = RANK_TOLERANCE) ->
     left, values, _ = la.svd(G, full_matrices=False)
     basis = left[:, values > tol * max(values[0], 1e-300)]
     return basis @ (basis.T @ lam)
+
+
+def minimum_norms(G: np.ndarray, lam: np.ndarray) -> np.ndarray:
+    """As minimum_norm, for many matrices at once: shapes (k, m, n) and (k, m).
+
+    lam* = G (G^T G)^+ G^T lam, with the pseudo-inverse by Tikhonov's regularisation and refinement: what the small
+    shift spoils is a share SHIFT / sigma^2 of the part along a singular value sigma; each pass takes that share again.
+    """
+    k, m, n = G.shape
+    transposed = np.swapaxes(G, 1, 2)
+    normal = transposed @ G
+    shift = SHIFT * np.trace(normal, axis1=1, axis2=2) / n
+    normal[:, np.arange(n), np.arange(n)] += np.where(shift > 0.0, shift, 1.0)[:, None]
+    best = np.zeros((k, m, 1))
+    inverse = np.linalg.inv(normal)
+    for _ in range(REFINEMENTS):
+        best += G @ (inverse @ (transposed @ (lam[:, :, None] - best)))
+    return best[:, :, 0]

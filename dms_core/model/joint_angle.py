@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from dms_core.jit import compiled
 from dms_core.model.frames import perpendicular, unit
 from dms_core.model.rotations import (
     add,
@@ -31,14 +31,14 @@ from dms_core.model.rotations import (
 )
 
 
-@njit(cache=True)
+@compiled
 def joint_angle(oi, oj, f, g, h, q):
     """theta [rad], in (-pi, pi]."""
     d = rotated(q, oj, h)
     return math.atan2(dot(rotated(q, oi, g), d), dot(rotated(q, oi, f), d))
 
 
-@njit(cache=True)
+@compiled
 def angle_directions(oi, oj, f, g, h, q):
     """(m, n): vectors of body i such that b is the gradient of (A_i m).(A_j h), and a that of (A_i n).(A_j h)."""
     d = rotated(q, oj, h)
@@ -47,7 +47,7 @@ def angle_directions(oi, oj, f, g, h, q):
     return scale(1.0 / D, sub(scale(c, g), scale(s, f))), scale(1.0 / D, add(scale(c, f), scale(s, g)))
 
 
-@njit(cache=True)
+@compiled
 def _gradient(oi, oj, m, h, q):
     """2 K p of (A_i m).(A_j h) for both bodies: two 4-tuples."""
     return (
@@ -56,7 +56,7 @@ def _gradient(oi, oj, m, h, q):
     )
 
 
-@njit(cache=True)
+@compiled
 def angle_rate(oi, oj, f, g, h, q, v):
     """theta_q v [rad/s]."""
     m, _ = angle_directions(oi, oj, f, g, h, q)
@@ -67,7 +67,7 @@ def angle_rate(oi, oj, f, g, h, q, v):
     return rate
 
 
-@njit(cache=True)
+@compiled
 def add_angle_gradient(k, oi, oj, f, g, h, q, factor, G):
     """G[k, :] += factor theta_q."""
     m, _ = angle_directions(oi, oj, f, g, h, q)
@@ -77,7 +77,7 @@ def add_angle_gradient(k, oi, oj, f, g, h, q, factor, G):
         G[k, oj + 3 + n] += 2.0 * factor * gj[n]
 
 
-@njit(cache=True)
+@compiled
 def add_angle_hessian(oi, oj, f, g, h, q, factor, H):
     """H[:, :] += factor theta_qq."""
     m, n = angle_directions(oi, oj, f, g, h, q)
@@ -95,7 +95,7 @@ def add_angle_hessian(oi, oj, f, g, h, q, factor, H):
             H[oj + 3 + j, oi + 3 + k] -= x
 
 
-@njit(cache=True)
+@compiled
 def add_angle_rate_gradient(k, oi, oj, f, g, h, q, v, factor, W):
     """W[k, :] += factor (theta_q v)_q = factor theta_qq v."""
     m, n = angle_directions(oi, oj, f, g, h, q)

@@ -13,52 +13,52 @@ A body occupies seven local coordinates from offset o: position q[o:o+3], Euler 
 Tuples live in registers: nothing here allocates.
 """
 
-from numba import njit
+from dms_core.jit import compiled
 
 
-@njit(cache=True)
+@compiled
 def vec(x, k):
     """Three entries of the array x from index k, as a tuple."""
     return (x[k], x[k + 1], x[k + 2])
 
 
-@njit(cache=True)
+@compiled
 def add(a, b):
     """a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@njit(cache=True)
+@compiled
 def sub(a, b):
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit(cache=True)
+@compiled
 def scale(c, a):
     """c a."""
     return (c * a[0], c * a[1], c * a[2])
 
 
-@njit(cache=True)
+@compiled
 def dot(a, b):
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@compiled
 def cross(a, b):
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(cache=True)
+@compiled
 def euler_parameters(x, o):
     """Entries 3..6 of a body's block at offset o (of q, v or vdot), as a 4-tuple."""
     return (x[o + 3], x[o + 4], x[o + 5], x[o + 6])
 
 
-@njit(cache=True)
+@compiled
 def bilinear(p, x, s):
     """The symmetric bilinear form behind A: bilinear(p, p, s) = A(p) s, d(A s)[x] = 2 bilinear(p, x, s)."""
     e, f = (p[1], p[2], p[3]), (x[1], x[2], x[3])
@@ -72,32 +72,32 @@ def bilinear(p, x, s):
     )
 
 
-@njit(cache=True)
+@compiled
 def rotated(q, o, s):
     """A(p) s for the body at offset o: a body-fixed vector in ground axes."""
     p = euler_parameters(q, o)
     return bilinear(p, p, s)
 
 
-@njit(cache=True)
+@compiled
 def rotated_rate(q, v, o, s):
     """d(A s)/dt for the body at offset o."""
     return scale(2.0, bilinear(euler_parameters(q, o), euler_parameters(v, o), s))
 
 
-@njit(cache=True)
+@compiled
 def point(q, o, s):
     """r + A s: a body-fixed point in ground axes [m]."""
     return add(vec(q, o), rotated(q, o, s))
 
 
-@njit(cache=True)
+@compiled
 def point_rate(q, v, o, s):
     """Velocity of a body-fixed point in ground axes [m/s]."""
     return add(vec(v, o), rotated_rate(q, v, o, s))
 
 
-@njit(cache=True)
+@compiled
 def k_times(w, s, x):
     """K(w, s) x for a 4-tuple x."""
     c, k, e = cross(s, w), dot(w, s), (x[1], x[2], x[3])
@@ -110,7 +110,7 @@ def k_times(w, s, x):
     )
 
 
-@njit(cache=True)
+@compiled
 def add_gradient(G, i, o, q, w, s, factor):
     """G[i, p] += factor d(w . A s)/dp for the body at offset o, w held fixed."""
     g = k_times(w, s, euler_parameters(q, o))
@@ -118,7 +118,7 @@ def add_gradient(G, i, o, q, w, s, factor):
         G[i, o + 3 + k] += 2.0 * factor * g[k]
 
 
-@njit(cache=True)
+@compiled
 def add_row_hessian(W, i, o, x, w, s, factor):
     """W[i, p] += factor x^T d2(w . A s)/dp2 for the body at offset o; x is a block of seven (velocities)."""
     g = k_times(w, s, euler_parameters(x, o))
@@ -126,7 +126,7 @@ def add_row_hessian(W, i, o, x, w, s, factor):
         W[i, o + 3 + k] += 2.0 * factor * g[k]
 
 
-@njit(cache=True)
+@compiled
 def add_hessian(H, o, w, s, factor):
     """H[p, p] += factor d2(w . A s)/dp2 = 2 factor K(w, s) for the body at offset o."""
     c, k = cross(s, w), dot(w, s)
@@ -139,7 +139,7 @@ def add_hessian(H, o, w, s, factor):
         H[o + 4 + i, o + 4 + i] -= 2.0 * factor * k
 
 
-@njit(cache=True)
+@compiled
 def columns(q, o, s):
     """The four columns of d(A s)/dp (3 x 4) for the body at offset o."""
     p = euler_parameters(q, o)
@@ -151,7 +151,7 @@ def columns(q, o, s):
     )
 
 
-@njit(cache=True)
+@compiled
 def add_cross_hessian(H, q, oi, si, oj, sj, factor):
     """H[p_i, p_j] += factor (d(A_i s_i)/dp_i)^T d(A_j s_j)/dp_j, and its transpose into H[p_j, p_i]."""
     ci, cj = columns(q, oi, si), columns(q, oj, sj)

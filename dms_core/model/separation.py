@@ -7,8 +7,8 @@ Unlike the distance itself it is smooth everywhere. Body i stands at local offse
 """
 
 import numpy as np
-from numba import njit
 
+from dms_core.jit import compiled
 from dms_core.model.rotations import (
     add_cross_hessian,
     add_hessian,
@@ -23,19 +23,19 @@ from dms_core.model.rotations import (
 BODY_I, BODY_J = 0, 7
 
 
-@njit(cache=True)
+@compiled
 def separation(s_i, s_j, q):
     """d: from the point of body j to the point of body i, ground axes [m]."""
     return sub(point(q, BODY_I, s_i), point(q, BODY_J, s_j))
 
 
-@njit(cache=True)
+@compiled
 def separation_rate(s_i, s_j, q, v):
     """C v [m/s]."""
     return sub(point_rate(q, v, BODY_I, s_i), point_rate(q, v, BODY_J, s_j))
 
 
-@njit(cache=True)
+@compiled
 def _row(w, g, h):
     """The 14-tuple (w, 2 g, -w, -2 h)."""
     return (
@@ -44,13 +44,13 @@ def _row(w, g, h):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def separation_gradient(s_i, s_j, q, d):
     """d^T C for any vector d held fixed, as a 14-tuple; with the separation itself it is e_q."""
     return _row(d, k_times(d, s_i, euler_parameters(q, BODY_I)), k_times(d, s_j, euler_parameters(q, BODY_J)))
 
 
-@njit(cache=True)
+@compiled
 def separation_rate_gradient(s_i, s_j, q, v):
     """(e_q v)_q = e_qq v, as a 14-tuple: d^T C_qq v + (C v)^T C."""
     d, d_t = separation(s_i, s_j, q), separation_rate(s_i, s_j, q, v)
@@ -59,13 +59,13 @@ def separation_rate_gradient(s_i, s_j, q, v):
     return _row(d_t, g, h)
 
 
-@njit(cache=True)
+@compiled
 def _plus(x, y):
     """Sum of two 4-tuples."""
     return (x[0] + y[0], x[1] + y[1], x[2] + y[2], x[3] + y[3])
 
 
-@njit(cache=True)
+@compiled
 def add_separation_hessian(s_i, s_j, q, factor, H):
     """H[:, :] += factor e_qq."""
     d = separation(s_i, s_j, q)

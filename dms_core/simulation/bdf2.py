@@ -12,10 +12,9 @@ have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 
 
 import math
 
-from numba import njit
-
 from dms_core.assembly.arena import flags, floats, inner, ints
 from dms_core.assembly.residual import WORK, evaluate_inputs
+from dms_core.jit import compiled
 from dms_core.simulation.newton import CONVERGED, DIVERGED, STALE_MATRIX, newton
 from dms_core.simulation.state import AGE, H_BEFORE, H_BEFORE2, MODEL, STALE, STATE, T
 
@@ -27,7 +26,7 @@ MAX_AGE = 30
 """Stages after which a factorised matrix is renewed, however well it still contracts."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def set_weights(m, s, o):
     """Error weights, a share of atol + rtol |y|, from the last accepted values."""
     q, v, wq, wv = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.wq), floats(s, STATE.wv)
@@ -37,7 +36,7 @@ def set_weights(m, s, o):
         wv[i] = LOCAL_SHARE * ((o.atol if o.atol > 0.0 else o.rtol * scale_v[i]) + o.rtol * abs(v[i]))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def put_guess(m, s, c0, lam_slope):
     """The guess into the iterate; first-order coordinates get the v that belongs to their q."""
     w, second, cq = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq)
@@ -52,7 +51,7 @@ def put_guess(m, s, c0, lam_slope):
         mu[k] = mu_n[k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def solve_stage(m, s, o, t, c0, lam_slope):
     """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once."""
     count = ints(s, STATE.counts)
@@ -72,7 +71,7 @@ def solve_stage(m, s, o, t, c0, lam_slope):
     return code, iterations
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _prepare_bdf2(s, h, h1):
     """Constants cq, cv of the step; its guess, the quadratic through y_n, y_(n-1) and ydot_n, which carries y_(n-2)."""
     q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
@@ -88,7 +87,7 @@ def _prepare_bdf2(s, h, h1):
         v_guess[i] = v[i] + h * (vd[i] + ratio * (vd[i] - (v[i] - v_before[i]) / h1))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def bdf2_step(m, s, o, h):
     """One BDF2 step of size h into w. Gives (code, iterations, weighted local error)."""
     clock = floats(s, STATE.clock)
@@ -111,7 +110,7 @@ def bdf2_step(m, s, o, h):
     return code, iterations, error * C / (C + P)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _prepare_first_stage(s, h, c0):
     """Constants and guess of the stage at GAMMA h."""
     q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
@@ -122,7 +121,7 @@ def _prepare_first_stage(s, h, c0):
         q_guess[i], v_guess[i] = q[i] + GAMMA * h * qd[i], v[i] + GAMMA * h * vd[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _prepare_second_stage(s, h, c0):
     """Rates of the first stage; constants and guess of the one at h."""
     w = inner(s, STATE.w)
@@ -137,7 +136,7 @@ def _prepare_second_stage(s, h, c0):
         v_guess[i] = v[i] + h * vd[i] + 0.5 * h / GAMMA * (kv - vd[i])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def start_step(m, s, o, h):
     """One SDIRK2 step of size h into w. Gives (code, iterations, weighted local error)."""
     t, c0 = floats(s, STATE.clock)[T], 1.0 / (GAMMA * h)

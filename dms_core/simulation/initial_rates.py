@@ -8,10 +8,9 @@ force-velocity curve makes it a Newton iteration, halved whenever the residual g
 
 import math
 
-from numba import njit
-
 from dms_core.assembly.arena import flags, floats, indices, inner, ints
 from dms_core.assembly.residual import WORK, evaluate_rates
+from dms_core.jit import compiled
 from dms_core.simulation.linear_solve import back_substitute, factorise
 from dms_core.simulation.state import FACTORISATIONS, MODEL, STALE, STATE
 
@@ -20,7 +19,7 @@ TOLERANCE = 1e-11
 """Relative size of the last correction: the problem is solved to rounding, since all that follows builds on it."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _change(m, s, share):
     """Add a share of the correction to the unknowns; gives the largest relative correction."""
     w, second, active = inner(s, STATE.w), flags(m, MODEL.second), indices(m, MODEL.active)
@@ -43,7 +42,7 @@ def _change(m, s, share):
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _correct(m, s):
     """Newton correction at the present unknowns; False if the matrix is singular."""
     w, active = inner(s, STATE.w), indices(m, MODEL.active)
@@ -64,7 +63,7 @@ def _correct(m, s):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
     second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
@@ -87,7 +86,7 @@ def _iterate(m, s):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def consistent_rates(m, s):
     """Fill v (first-order), qd, vd, lam of the state at its q, v and the inputs in w.u; False on failure."""
     w, second = inner(s, STATE.w), flags(m, MODEL.second)

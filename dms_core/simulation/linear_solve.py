@@ -1,15 +1,14 @@
 """The two linear systems of a step, solved from the packed tables."""
 
-from numba import njit
-
 from dms_core.assembly.arena import fields, indices, inner, naturals, number
+from dms_core.jit import compiled
 from dms_core.linear.lu import factor, solve
 from dms_core.linear.symbolic import LuTables
 
 LU = fields(LuTables)
 
 
-@njit(cache=True)
+@compiled
 def lu_tables(t):
     """The LuTables behind a packed table."""
     return LuTables(
@@ -20,13 +19,13 @@ def lu_tables(t):
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def factorise(model, system, values, work):
     """Factor the linear system in field `system` of the model in place; its smallest relative pivot, 0 if singular."""
     return factor(lu_tables(inner(model, system)), values, work)[0]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def back_substitute(model, system, values, b, x, work):
     """x from the factors in `values`."""
     solve(lu_tables(inner(model, system)), values, b, x, work)

@@ -7,10 +7,9 @@ iteration contracts; corrections of a step that does not reduce the simplified N
 
 import math
 
-from numba import njit
-
 from dms_core.assembly.arena import floats, indices, inner, ints
 from dms_core.assembly.residual import WORK, evaluate_constraints, evaluate_newton, evaluate_residual
+from dms_core.jit import compiled
 from dms_core.simulation.linear_solve import back_substitute, factorise
 from dms_core.simulation.state import (
     AGE,
@@ -40,7 +39,7 @@ C0_CHANGE = 0.1
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def set_rates(s, c0):
     """vdot = c0 v + cv at the present iterate."""
     w, cv = inner(s, STATE.w), floats(s, STATE.cv)
@@ -49,7 +48,7 @@ def set_rates(s, c0):
         a[i] = c0 * v[i] + cv[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def right_hand_side(m, s, c0):
     """b = -(r1 / c0, r2 / c0^2, r3, r4 / c0), from the evaluated residual."""
     w, active, b, cq = inner(s, STATE.w), indices(m, MODEL.active), floats(s, STATE.b), floats(s, STATE.cq)
@@ -64,7 +63,7 @@ def right_hand_side(m, s, c0):
         b[2 * n + k + i] = -h * phi_v[active[i]]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def apply(m, s, c0, x, factor):
     """Add factor times the scaled correction x to q, v, lam, mu."""
     w, active = inner(s, STATE.w), indices(m, MODEL.active)
@@ -79,7 +78,7 @@ def apply(m, s, c0, x, factor):
     set_rates(s, c0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def correction_norm(s, c0):
     """Largest weighted component of the correction x in q and v, inf if any is not finite."""
     x, wq, wv = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv)
@@ -92,7 +91,7 @@ def correction_norm(s, c0):
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def refresh(m, s, c0):
     """Evaluate residual and matrix here and factorise; False if the matrix is singular."""
     values, count = floats(s, STATE.newton_values), ints(s, STATE.counts)
@@ -106,7 +105,7 @@ def refresh(m, s, c0):
     return factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work)) > SINGULAR_PIVOT
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def correction(m, s, c0):
     """Newton correction x at the present iterate, with the matrix at hand; gives its norm."""
     right_hand_side(m, s, c0)
@@ -122,7 +121,7 @@ def correction(m, s, c0):
     return correction_norm(s, c0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def largest_errors(s):
     """Largest |phi| and |phi_q v + phi_t| of the last evaluation, over all rows, redundant ones included."""
     w = inner(s, STATE.w)
@@ -134,7 +133,7 @@ def largest_errors(s):
     return largest, largest_v
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def note_errors(s):
     """Keep the largest constraint errors and |mu| of the run."""
     largest, mu = floats(s, STATE.largest), floats(inner(s, STATE.w), WORK.mu)
@@ -145,7 +144,7 @@ def note_errors(s):
         largest[MU] = max(largest[MU], abs(mu[k]))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def line_search(m, s, c0, before):
     """Halve the last correction until the simplified one shrinks; gives its norm, inf when it never does."""
     share = 1.0
@@ -159,7 +158,7 @@ def line_search(m, s, c0, before):
     return math.inf
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def close_constraints(m, s, o, c0):
     """Bring phi and phi_q v below their tolerance with corrections that leave r1 and r2 alone; False if they resist.
 
@@ -184,7 +183,7 @@ def close_constraints(m, s, o, c0):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def newton(m, s, o, c0):
     """Solve the stage from the guess in w. Gives (code, iterations).
 

@@ -7,10 +7,9 @@ keeps the factorised matrix good.
 
 import math
 
-from numba import njit
-
 from dms_core.assembly.arena import floats, inner, ints
 from dms_core.assembly.residual import SIGNALS, WORK, evaluate_inputs
+from dms_core.jit import compiled
 from dms_core.simulation.bdf2 import GAMMA, bdf2_step, set_weights, start_step
 from dms_core.simulation.initial_rates import consistent_rates
 from dms_core.simulation.newton import CONVERGED, MAX_ITERATIONS, SINGULAR, note_errors
@@ -37,7 +36,7 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def next_stop(s, t_end):
     """The next time a step must end on: a jump of an input or the end."""
     t, jumps = floats(s, STATE.clock)[T], floats(inner(s, STATE.signals), SIGNALS.jumps)
@@ -47,7 +46,7 @@ def next_stop(s, t_end):
     return t_end
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def first_step(s, o):
     """A careful first size: accelerations move no coordinate by more than a tenth of its weight."""
     vd, wq, fastest = floats(s, STATE.vd), floats(s, STATE.wq), 0.0
@@ -56,7 +55,7 @@ def first_step(s, o):
     return min(math.sqrt(0.2 / fastest), o.h_max) if fastest > 0.0 else o.h_max
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def record_point(s, record, k):
     """Row k of the record: t, q, v, vdot, lam, mu."""
     q, v, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.vd)
@@ -72,7 +71,7 @@ def record_point(s, record, k):
         record[k, 1 + 3 * n + m + i] = mu[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def accept(s, h, c0, started):
     """Take over the solved step: history, derivatives of the method, clock."""
     w, clock, largest = inner(s, STATE.w), floats(s, STATE.clock), floats(s, STATE.largest)
@@ -100,7 +99,7 @@ def accept(s, h, c0, started):
     ints(s, STATE.counts)[RESTART] = 0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def restart(m, s, o):
     """Values just behind a jump: inputs from the right, consistent rates and multipliers; False if there are none."""
     clock = floats(s, STATE.clock)
@@ -114,7 +113,7 @@ def restart(m, s, o):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def landing_size(h, rest, fixed):
     """h shortened so that a step ends after `rest`, without leaving a sliver for the one after."""
     if h >= rest * (1.0 - 1e-9):
@@ -122,7 +121,7 @@ def landing_size(h, rest, fixed):
     return 0.5 * rest if h > 0.55 * rest and not fixed else h
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def try_step(m, s, o, h, started):
     """One attempt; gives (code, iterations per stage, error, c0)."""
     if started:
@@ -133,7 +132,7 @@ def try_step(m, s, o, h, started):
     return code, 1.0 * iterations, error, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def resize(h, error, iterations):
     """The next step size from the error and the Newton count."""
     effort = (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
@@ -142,7 +141,7 @@ def resize(h, error, iterations):
     return h if 1.0 <= factor < DEAD_ZONE else h * factor
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def one_step(m, s, o, stop):
     """Attempts until one step is accepted; gives DONE or what went wrong."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
@@ -175,7 +174,7 @@ def one_step(m, s, o, stop):
     note_errors(s)
     accept(s, h, c0, started)
     if started:
-        # Multipliers and accelerations of the start's last stage are of order 1 only; those of its q and v are of order 2.
+        # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2.
         consistent_rates(m, s)
     if h == rest:
         land(s, stop)
@@ -186,7 +185,7 @@ def one_step(m, s, o, stop):
     return DONE
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def land(s, stop):
     """Set the clock exactly; behind a jump of an input the method starts afresh."""
     floats(s, STATE.clock)[T] = stop
@@ -196,7 +195,7 @@ def land(s, stop):
             ints(s, STATE.counts)[RESTART] = 1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def advance(m, s, o, t_end, record, recorded):
     """Step until t_end; gives (code, number of rows recorded). BUFFER_FULL asks to be called again with room."""
     clock, count = floats(s, STATE.clock), ints(s, STATE.counts)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Vector
 
 
-@njit(cache=True)
+@compiled
 def point_mass(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """m rddot; the rows of the constant Euler parameters stay empty."""
     for i in range(3):

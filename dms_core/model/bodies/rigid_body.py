@@ -11,15 +11,15 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field, field_validator, model_validator
 
+from dms_core.jit import compiled
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
 from dms_core.model.frames import g_matrix, rotation_matrix
 from dms_core.model.rotations import euler_parameters
 
 
-@njit(cache=True)
+@compiled
 def _g_times(p, x):
     """G(p) x for two 4-tuples."""
     return (
@@ -29,7 +29,7 @@ def _g_times(p, x):
     )
 
 
-@njit(cache=True)
+@compiled
 def _gt_times(p, w):
     """G(p)^T w for a 4-tuple and a 3-tuple."""
     return (
@@ -40,7 +40,7 @@ def _gt_times(p, w):
     )
 
 
-@njit(cache=True)
+@compiled
 def _inertia_times(par, w):
     """J w with J = [xx, yy, zz, xy, xz, yz] in par[1:7]."""
     return (
@@ -50,7 +50,7 @@ def _inertia_times(par, w):
     )
 
 
-@njit(cache=True)
+@compiled
 def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """M vdot - f_v of one body."""
     m = par[0]

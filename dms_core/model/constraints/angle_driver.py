@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.constraints.primitives import joint_pattern
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Constraint, Placement, Vector
@@ -26,7 +26,7 @@ from dms_core.model.joint_angle import (
 from dms_core.model.rotations import vec
 
 
-@njit(cache=True)
+@compiled
 def angle_driver(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: f, g, h of the angle."""
     f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)

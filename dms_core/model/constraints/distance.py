@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import GROUND, Constraint, ConstraintPattern, Placement, Vector
 from dms_core.model.rotations import dot, vec
 from dms_core.model.separation import (
@@ -25,7 +25,7 @@ from dms_core.model.separation import (
 )
 
 
-@njit(cache=True)
+@compiled
 def distance(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: s_i, s_j, L."""
     s_i, s_j, length = vec(par, 0), vec(par, 3), par[6]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Constraint, ConstraintPattern, Placement
 
 
-@njit(cache=True)
+@compiled
 def euler_norm(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """p^T p - 1."""
     phi[0] = -1.0

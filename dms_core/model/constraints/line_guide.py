@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.constraints.primitives import dot2, joint_pattern
 from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
@@ -20,7 +20,7 @@ from dms_core.model.frames import perpendicular, unit
 from dms_core.model.rotations import vec
 
 
-@njit(cache=True)
+@compiled
 def line_guide(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: s_i, s_j, f, g."""
     for k in range(2):

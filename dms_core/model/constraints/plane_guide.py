@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.constraints.primitives import dot2, joint_pattern
 from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
@@ -21,7 +21,7 @@ from dms_core.model.frames import unit
 from dms_core.model.rotations import vec
 
 
-@njit(cache=True)
+@compiled
 def plane_guide(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: s_i, s_j, n."""
     dot2(0, 0, 7, vec(par, 6), vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)

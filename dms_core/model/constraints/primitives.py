@@ -9,8 +9,8 @@ H = (phi_q^T lam)_q for the bodies at local offsets oi and oj.
 """
 
 import numpy as np
-from numba import njit
 
+from dms_core.jit import compiled
 from dms_core.model.element import ConstraintPattern
 from dms_core.model.rotations import (
     add_cross_hessian,
@@ -29,7 +29,7 @@ from dms_core.model.rotations import (
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@njit(cache=True)
+@compiled
 def coincidence(k, oi, oj, si, sj, q, v, lam, level, phi, G, W, H):
     """Rows k, k+1, k+2: the points s_i and s_j coincide [m]."""
     d = sub(point(q, oi, si), point(q, oj, sj))
@@ -50,7 +50,7 @@ def coincidence(k, oi, oj, si, sj, q, v, lam, level, phi, G, W, H):
             add_row_hessian(W, k + m, oj, v, UNIT[m], sj, -1.0)
 
 
-@njit(cache=True)
+@compiled
 def dot1(k, oi, oj, a, b, c, q, v, lam, level, phi, G, W, H):
     """Row k: the directions a of body i and b of body j keep their scalar product c [-]."""
     f, g = rotated(q, oi, a), rotated(q, oj, b)
@@ -67,7 +67,7 @@ def dot1(k, oi, oj, a, b, c, q, v, lam, level, phi, G, W, H):
         add_gradient(W, k, oj, q, rotated_rate(q, v, oi, a), b, 1.0)
 
 
-@njit(cache=True)
+@compiled
 def dot2(k, oi, oj, a, si, sj, q, v, lam, level, phi, G, W, H):
     """Row k: point s_j of body j stays in the plane through s_i of body i with normal a [m]."""
     f = rotated(q, oi, a)
@@ -83,7 +83,7 @@ def dot2(k, oi, oj, a, si, sj, q, v, lam, level, phi, G, W, H):
         _dot2_second(k, oi, oj, a, si, sj, q, v, lam[k], f, d, W, H)
 
 
-@njit(cache=True)
+@compiled
 def _dot2_second(k, oi, oj, a, si, sj, q, v, lam, f, d, W, H):
     """Second derivatives of dot2."""
     ca = columns(q, oi, a)

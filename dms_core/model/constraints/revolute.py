@@ -9,16 +9,16 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.constraints.primitives import coincidence, dot1, joint_pattern
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.frames import perpendicular, unit
 from dms_core.model.rotations import vec
 
 
-@njit(cache=True)
+@compiled
 def revolute(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: s_i, s_j, f_i, g_i, a_j."""
     coincidence(0, 0, 7, vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field, model_validator
 
+from dms_core.jit import compiled
 from dms_core.model.element import Constraint, ConstraintPattern, Placement
 from dms_core.model.ropes.path import (
     PathPoint,
@@ -25,7 +25,7 @@ from dms_core.model.ropes.path import (
 )
 
 
-@njit(cache=True)
+@compiled
 def rope_length(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """ip: [length is an input, path]; par: [constant psi, path]."""
     psi = par[0]

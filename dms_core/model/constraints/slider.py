@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.constraints.primitives import dot1, dot2, joint_pattern
 from dms_core.model.constraints.relative_pose import joint_arms, relative_rotation
 from dms_core.model.element import GROUND, Constraint, Placement, Quaternion, Vector
@@ -21,7 +21,7 @@ from dms_core.model.frames import perpendicular, unit
 from dms_core.model.rotations import vec
 
 
-@njit(cache=True)
+@compiled
 def slider(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: s_i, s_j, f, g, a, f', g', a'."""
     s_i, s_j = vec(par, 0), vec(par, 3)

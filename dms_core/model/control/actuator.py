@@ -26,9 +26,9 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numba import njit
 from pydantic import Field, model_validator
 
+from dms_core.jit import compiled
 from dms_core.model.control.pid import Pid
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 
@@ -37,7 +37,7 @@ NOMINAL_TENSION = 100.0
 tenths of a newton, and a tolerance of a newton's fraction would let that ripple dictate the step."""
 
 
-@njit(cache=True)
+@compiled
 def positive_part(x, width):
     """P(x) and its derivative P'(x)."""
     s = x / width + 0.5
@@ -48,7 +48,7 @@ def positive_part(x, width):
     return width * s * s * s * (1.0 - 0.5 * s), s * s * (3.0 - 2.0 * s)
 
 
-@njit(cache=True)
+@compiled
 def pulled_tension(x, width, limit):
     """P(x), smoothly limited if limit > 0, and its derivative by x."""
     y, slope = positive_part(x, width)
@@ -59,7 +59,7 @@ def pulled_tension(x, width, limit):
     return y, slope
 
 
-@njit(cache=True)
+@compiled
 def rope_actuator(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: from a PID, has authority. par: T, pretension, limit (0: none), width, sign ki, sign kp, sign kd."""
     T, pretension, limit = par[0], par[1], par[2]

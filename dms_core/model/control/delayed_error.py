@@ -14,9 +14,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
 from dms_core.model.joint_angle import add_angle_gradient, joint_angle
 from dms_core.model.rotations import vec
@@ -26,7 +26,7 @@ OWN = 14
 """Local coordinates: two bodies, then the states of the chain from first to last."""
 
 
-@njit(cache=True)
+@compiled
 def delayed_error(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: number of lags. par: f, g, h of the joint angle, time constant of one lag [s]."""
     f, g, h, lag = vec(par, 0), vec(par, 3), vec(par, 6), par[9]

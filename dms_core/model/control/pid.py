@@ -21,10 +21,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field, model_validator
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
 from dms_core.model.joint_angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
 from dms_core.model.rotations import vec
@@ -34,7 +34,7 @@ OWN, FILTER = 14, 15
 """Local coordinates: two bodies, then q_c, then q_f if there is one."""
 
 
-@njit(cache=True)
+@compiled
 def pid(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: has reference, has filter. par: f, g, h of the joint angle, drift gain [1/s]."""
     f, g, h, drift_gain = vec(par, 0), vec(par, 3), vec(par, 6), par[9]

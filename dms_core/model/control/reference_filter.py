@@ -11,15 +11,15 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 
 _ALL = np.ones((1, 1), bool)
 
 
-@njit(cache=True)
+@compiled
 def reference_filter(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """par: w, zeta."""
     w, zeta = par[0], par[1]

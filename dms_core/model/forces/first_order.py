@@ -10,13 +10,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 
 
-@njit(cache=True)
+@compiled
 def first_order(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: has an input. par: T, g."""
     r[0] += par[0] * v[0] + q[0]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import Force, Pattern, Placement, Vector
 
 
-@njit(cache=True)
+@compiled
 def gravity(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """par: m g."""
     for i in range(3):

@@ -11,9 +11,9 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.joint_angle import (
@@ -27,7 +27,7 @@ from dms_core.model.joint_angle import (
 from dms_core.model.rotations import euler_parameters, k_times, rotated, vec
 
 
-@njit(cache=True)
+@compiled
 def _angle_gradient(f, g, h, q):
     """theta_q by the Euler parameters of both bodies: an 8-tuple."""
     m, _ = angle_directions(0, 7, f, g, h, q)
@@ -38,13 +38,13 @@ def _angle_gradient(f, g, h, q):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def _place(i):
     """Local coordinate of entry i of the 8-tuple."""
     return 3 + i if i < 4 else 6 + i
 
 
-@njit(cache=True)
+@compiled
 def _angle_rate_gradient(f, g, h, q, v, Jq):
     """(theta_q v)_q as an 8-tuple; row 3 of Jq, still zero, is borrowed and given back as zero."""
     add_angle_rate_gradient(3, 0, 7, f, g, h, q, v, 1.0, Jq)
@@ -54,7 +54,7 @@ def _angle_rate_gradient(f, g, h, q, v, Jq):
     return w
 
 
-@njit(cache=True)
+@compiled
 def joint_spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """par: f, g, h of the angle, k, c, theta0."""
     f, g, h, k, c = vec(par, 0), vec(par, 3), vec(par, 6), par[9], par[10]

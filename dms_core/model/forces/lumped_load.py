@@ -12,15 +12,15 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.rotations import add_hessian, columns, cross, dot, euler_parameters, rotated, vec
 
 
-@njit(cache=True)
+@compiled
 def _moment(p, m, sign):
     """E^T m for sign -1, G^T m for sign +1: linear in the 4-tuple p."""
     e = (p[1], p[2], p[3])
@@ -28,7 +28,7 @@ def _moment(p, m, sign):
     return (-dot(e, m), p[0] * m[0] + sign * x[0], p[0] * m[1] + sign * x[1], p[0] * m[2] + sign * x[2])
 
 
-@njit(cache=True)
+@compiled
 def _lumped_load_derivatives(q, s, F, F_b, m, sign, factor, follows, Jq):
     """Jq of -Q."""
     add_hessian(Jq, 0, F, s, -1.0)
@@ -45,7 +45,7 @@ def _lumped_load_derivatives(q, s, F, F_b, m, sign, factor, follows, Jq):
                 Jq[3 + n, 3 + k] -= factor * dot(d[n], c[k])
 
 
-@njit(cache=True)
+@compiled
 def lumped_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: load in body axes, load scaled by the input. par: s, F, M."""
     follows, factor = ip[0] == 1, 1.0

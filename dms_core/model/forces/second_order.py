@@ -10,13 +10,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 
 
-@njit(cache=True)
+@compiled
 def second_order(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: has an input. par: m, c, k, g."""
     r[0] += par[0] * a[0] + par[1] * v[0] + par[2] * q[0]

@@ -11,9 +11,9 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import GROUND, Force, Pattern, Placement, Vector
 from dms_core.model.rotations import dot, scale, vec
 from dms_core.model.separation import (
@@ -29,7 +29,7 @@ SHORTEST = 1e-9
 """Length below which the direction is not resolved [m]: the force fades to 0 there instead of a division by 0."""
 
 
-@njit(cache=True)
+@compiled
 def spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """par: s_i, s_j, k, c, l0, T0."""
     s_i, s_j, k, c = vec(par, 0), vec(par, 3), par[6], par[7]

@@ -6,13 +6,13 @@ Continuous, with a kink in slope at u = a. With u limited to [MINIMUM, 1] a solu
 the activation itself needs no limit; a Newton iterate far below 0 is kept from a vanishing time constant.
 """
 
-from numba import njit
+from dms_core.jit import compiled
 
 MINIMUM = 0.01
 """Least activation and excitation: a muscle is never fully silent, and its force stays invertible."""
 
 
-@njit(cache=True)
+@compiled
 def limited(u):
     """The excitation within [MINIMUM, 1], and the derivative of that."""
     if u <= MINIMUM:
@@ -22,7 +22,7 @@ def limited(u):
     return u, 1.0
 
 
-@njit(cache=True)
+@compiled
 def activation_rate(a, u, tau_act, tau_deact):
     """(adot [1/s], d adot/da, d adot/du)."""
     s, s_a = 0.5 + 1.5 * a, 1.5

@@ -20,11 +20,11 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field, model_validator
 from scipy.optimize import brentq
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 from dms_core.model.muscles.activation import MINIMUM, activation_rate, limited
 from dms_core.model.muscles.thelen_curves import (
@@ -56,7 +56,7 @@ PATH_INTEGERS = 2
 activation), and the number m of body coordinates: q_m is local coordinate m, a is m + 1, a reflex m + 2."""
 
 
-@njit(cache=True)
+@compiled
 def pennation_cosine(par, length):
     """(cos(alpha), its slope by the fibre length [1/m])."""
     height = par[3]
@@ -68,7 +68,7 @@ def pennation_cosine(par, length):
     return c, s * s / (length * c)
 
 
-@njit(cache=True)
+@compiled
 def muscle_activation(ip, q, u):
     """(activation [-], its derivative by the input where the input is the activation)."""
     if ip[0] > 0:
@@ -76,7 +76,7 @@ def muscle_activation(ip, q, u):
     return limited(u[0, 0])
 
 
-@njit(cache=True)
+@compiled
 def muscle_excitation(ip, par, q, u):
     """(excitation [-], its derivative by the reflex coordinate)."""
     if ip[0] < 2:
@@ -85,7 +85,7 @@ def muscle_excitation(ip, par, q, u):
     return e, inside * par[REFLEX_GAIN]
 
 
-@njit(cache=True)
+@compiled
 def tendon_state(par, length, fibre):
     """(sigma [N], dsigma/dl [N/m], dsigma/dq_m [N/m]) at the given muscle-tendon and fibre lengths."""
     c, c_l = pennation_cosine(par, fibre)
@@ -94,7 +94,7 @@ def tendon_state(par, length, fibre):
     return par[0] * ft, by_length, -by_length * (c + fibre * c_l)
 
 
-@njit(cache=True)
+@compiled
 def fibre_state(par, fibre, rate, a):
     """Active and passive fibre force [N]; derivatives of the active by q_m, its rate and a, of the passive by q_m."""
     fl, fl_l = active_force(fibre / par[1], par[7])
@@ -111,7 +111,7 @@ def fibre_state(par, fibre, rate, a):
     )
 
 
-@njit(cache=True)
+@compiled
 def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """Tables as described at PATH_INTEGERS and PATH_NUMBERS."""
     m = ip[1]

@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from numba import njit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import explain
 
 TOE_FORCE = 0.33
@@ -31,14 +31,14 @@ LENGTHENING_LIMIT = 0.95
 """Share of Flen above which the force-velocity curve follows its tangent (Flen itself is a pole)."""
 
 
-@njit(cache=True)
+@compiled
 def active_force(l, gamma):  # noqa: E741
     """(fl, dfl/dl)."""
     f = math.exp(-(l - 1.0) * (l - 1.0) / gamma)
     return f, -2.0 * (l - 1.0) / gamma * f
 
 
-@njit(cache=True)
+@compiled
 def passive_force(l, k, e0):  # noqa: E741
     """(fp, dfp/dl)."""
     if l <= 1.0:
@@ -47,7 +47,7 @@ def passive_force(l, k, e0):  # noqa: E741
     return (f - 1.0) * scale, k / e0 * f * scale
 
 
-@njit(cache=True)
+@compiled
 def tendon_force(e, e_toe, k_lin):
     """(ft, dft/de)."""
     if e <= 0.0:
@@ -58,7 +58,7 @@ def tendon_force(e, e_toe, k_lin):
     return (f - 1.0) * scale, TOE_SHAPE / e_toe * f * scale
 
 
-@njit(cache=True)
+@compiled
 def _velocity_shape(x, af, f_len):
     """(fv, dfv/dx) at the reduced velocity x."""
     if x <= 0.0:
@@ -77,7 +77,7 @@ def _velocity_shape(x, af, f_len):
     return f_end + slope * (x - x_end), slope
 
 
-@njit(cache=True)
+@compiled
 def force_velocity(w, a, af, f_len):
     """(fv, dfv/dw, dfv/da); the activation counts as 0 below 0, where the curve would lose its meaning."""
     reach = 0.25 + 0.75 * max(a, 0.0)

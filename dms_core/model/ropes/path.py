@@ -20,10 +20,10 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.element import GROUND, Vector, explain
 from dms_core.model.rotations import (
     add_hessian,
@@ -42,7 +42,7 @@ SHORTEST = 1e-12
 """Length [m] below which a segment has no direction; keeps the kernels finite where two points meet."""
 
 
-@njit(cache=True)
+@compiled
 def _end(q, o, s):
     """A path point in ground axes [m]."""
     if o < 0:
@@ -50,7 +50,7 @@ def _end(q, o, s):
     return point(q, o, s)
 
 
-@njit(cache=True)
+@compiled
 def _end_rate(q, v, o, s):
     """Velocity of a path point [m/s]."""
     if o < 0:
@@ -58,7 +58,7 @@ def _end_rate(q, v, o, s):
     return point_rate(q, v, o, s)
 
 
-@njit(cache=True)
+@compiled
 def _segment(ip, i, par, j, k, q):
     """Crossing segment k: offsets and arms of its two points, unit vector from the first to the second, length."""
     oa, ob = ip[i + 1 + 2 * k], ip[i + 2 + 2 * k]
@@ -68,7 +68,7 @@ def _segment(ip, i, par, j, k, q):
     return oa, ob, sa, sb, scale(1.0 / length, d), length
 
 
-@njit(cache=True)
+@compiled
 def _add_point_gradient(q, o, w, s, factor, x):
     """x += factor d(w . x_point)/dq at fixed w."""
     if o < 0:
@@ -80,7 +80,7 @@ def _add_point_gradient(q, o, w, s, factor, x):
         x[o + 3 + m] += 2.0 * factor * g[m]
 
 
-@njit(cache=True)
+@compiled
 def path_length(ip, i, par, j, q):
     """l(q) [m]."""
     total = par[j]
@@ -89,7 +89,7 @@ def path_length(ip, i, par, j, q):
     return total
 
 
-@njit(cache=True)
+@compiled
 def path_rate(ip, i, par, j, q, v):
     """l_q v [m/s]."""
     rate = 0.0
@@ -99,7 +99,7 @@ def path_rate(ip, i, par, j, q, v):
     return rate
 
 
-@njit(cache=True)
+@compiled
 def add_path_gradient(ip, i, par, j, q, factor, x):
     """x += factor l_q, shape (n,)."""
     for k in range(ip[i]):
@@ -108,7 +108,7 @@ def add_path_gradient(ip, i, par, j, q, factor, x):
         _add_point_gradient(q, oa, w, sa, -factor, x)
 
 
-@njit(cache=True)
+@compiled
 def add_path_rate_gradient(ip, i, par, j, q, v, factor, x):
     """x += factor (l_q v)_q = factor l_qq v, shape (n,)."""
     for k in range(ip[i]):
@@ -121,7 +121,7 @@ def add_path_rate_gradient(ip, i, par, j, q, v, factor, x):
         _add_turning(v, oa, w, sa, -factor, x)
 
 
-@njit(cache=True)
+@compiled
 def _add_turning(v, o, w, s, factor, x):
     """x += factor d2(w . A s)/dp2 pdot."""
     if o < 0:
@@ -131,7 +131,7 @@ def _add_turning(v, o, w, s, factor, x):
         x[o + 3 + m] += 2.0 * factor * g[m]
 
 
-@njit(cache=True)
+@compiled
 def add_path_hessian(ip, i, par, j, q, factor, H):
     """H += factor l_qq, shape (n, n)."""
     for k in range(ip[i]):
@@ -148,7 +148,7 @@ def add_path_hessian(ip, i, par, j, q, factor, H):
             _add_block(H, q, ob, sb, oa, sa, w, -c)
 
 
-@njit(cache=True)
+@compiled
 def _add_block(H, q, oi, si, oj, sj, w, c):
     """H[i, j] += c [I, C_i]^T (I - w w^T) [I, C_j] with C = d(A s)/dp, for the bodies at oi and oj."""
     ci, cj = columns(q, oi, si), columns(q, oj, sj)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from pydantic import Field, model_validator
 
+from dms_core.jit import compiled
 from dms_core.model.element import Force, Pattern, Placement
 from dms_core.model.ropes.path import PathPoint, add_path_gradient, add_path_hessian, moving_path, path_pattern
 
@@ -17,7 +17,7 @@ PATH_INTEGERS, PATH_NUMBERS = 2, 1
 """Indices in `ip` and `par` where the path begins."""
 
 
-@njit(cache=True)
+@compiled
 def rope_tension(ip, par, q, u):
     """tau [N]. A negative input pulls nothing; a coordinate is taken as it is, its owner keeps it from pushing."""
     if ip[0] == INPUT:
@@ -27,7 +27,7 @@ def rope_tension(ip, par, q, u):
     return par[0]
 
 
-@njit(cache=True)
+@compiled
 def rope_force(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: [source of the tension, number n of body coordinates, path]; par: [constant tension, path]."""
     tau = rope_tension(ip, par, q, u)

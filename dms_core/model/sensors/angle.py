@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
 from dms_core.model.joint_angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
 from dms_core.model.rotations import (
@@ -34,14 +34,14 @@ from dms_core.model.rotations import (
 from dms_core.model.sensed_angle import sensed_angle
 
 
-@njit(cache=True)
+@compiled
 def rotated_acceleration(q, v, a, o, s):
     """d2(A s)/dt2 for the body at offset o."""
     p, pd, pdd = euler_parameters(q, o), euler_parameters(v, o), euler_parameters(a, o)
     return scale(2.0, add(bilinear(p, pdd, s), bilinear(pd, pd, s)))
 
 
-@njit(cache=True)
+@compiled
 def _course(oi, oj, m, h, q, v, a):
     """(A_i m) . (A_j h) with its first and second time derivative."""
     e, e1, e2 = rotated(q, oi, m), rotated_rate(q, v, oi, m), rotated_acceleration(q, v, a, oi, m)
@@ -49,21 +49,21 @@ def _course(oi, oj, m, h, q, v, a):
     return dot(e, d), dot(e1, d) + dot(e, d1), dot(e2, d) + 2.0 * dot(e1, d1) + dot(e, d2)
 
 
-@njit(cache=True)
+@compiled
 def _complex_course(oi, oj, f, g, h, q, v, a):
     """z, zdot, zddot."""
     c, s = _course(oi, oj, f, h, q, v, a), _course(oi, oj, g, h, q, v, a)
     return complex(c[0], s[0]), complex(c[1], s[1]), complex(c[2], s[2])
 
 
-@njit(cache=True)
+@compiled
 def angle_acceleration(oi, oj, f, g, h, q, v, a):
     """theta_q vdot + v^T theta_qq v [rad/s^2]."""
     z, z1, z2 = _complex_course(oi, oj, f, g, h, q, v, a)
     return (z2 / z - (z1 / z) * (z1 / z)).imag
 
 
-@njit(cache=True)
+@compiled
 def _add_first_body(k, oi, oj, m2, m1, m0, h, q, v, a, G):
     """Gradient by p_i of the courses of (A_i m) . (A_j h), each k-th time derivative with its own m."""
     d, d1, d2 = rotated(q, oj, h), rotated_rate(q, v, oj, h), rotated_acceleration(q, v, a, oj, h)
@@ -75,7 +75,7 @@ def _add_first_body(k, oi, oj, m2, m1, m0, h, q, v, a, G):
         G[k, oi + 3 + n] += 2.0 * (a2[n] + 2.0 * a1[n] + a0[n] + b1[n] + b0[n] + c0[n])
 
 
-@njit(cache=True)
+@compiled
 def _add_second_body(k, oi, oj, m2, m1, m0, h, q, v, a, G):
     """The same by p_j; K(w, h) is linear in w, which saves half of the products."""
     w2 = rotated(q, oi, m2)
@@ -88,7 +88,7 @@ def _add_second_body(k, oi, oj, m2, m1, m0, h, q, v, a, G):
         G[k, oj + 3 + n] += 2.0 * (x2[n] + x1[n] + x0[n])
 
 
-@njit(cache=True)
+@compiled
 def add_angle_acceleration_gradient(k, oi, oj, f, g, h, q, v, a, G):
     """G[k, :] += thetaddot_q."""
     z, z1, z2 = _complex_course(oi, oj, f, g, h, q, v, a)
@@ -102,7 +102,7 @@ def add_angle_acceleration_gradient(k, oi, oj, f, g, h, q, v, a, G):
     _add_second_body(k, oi, oj, m2, m1, m0, h, q, v, a, G)
 
 
-@njit(cache=True)
+@compiled
 def joint_angle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """par: f, g, h of dms_core.model.joint_angle."""
     f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Placement, Sensor
 
 
-@njit(cache=True)
+@compiled
 def coordinate_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """No numbers."""
     y[0], y[1], y[2] = q[0], v[0], a[0]

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
 from dms_core.model.rotations import add_gradient, dot, euler_parameters, k_times, rotated, sub, vec
 from dms_core.model.sensors.point import point_acceleration
@@ -20,7 +20,7 @@ from dms_core.model.sensors.point import point_acceleration
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@njit(cache=True)
+@compiled
 def _angular_velocity_rows(p, factor, Y):
     """Y[3:6, 3:7] = 2 factor G(p)."""
     G = (
@@ -33,7 +33,7 @@ def _angular_velocity_rows(p, factor, Y):
             Y[3 + m, 3 + n] = 2.0 * factor * G[m][n]
 
 
-@njit(cache=True)
+@compiled
 def imu(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """par: s from the centre of mass, g."""
     s = vec(par, 0)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal
 
-from numba import njit
 from pydantic import Field, field_validator
 
+from dms_core.jit import compiled
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.muscles.muscle import (
     PATH_INTEGERS,
@@ -51,7 +51,7 @@ Component = Literal[
 ]
 
 
-@njit(cache=True)
+@compiled
 def muscle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """Tables of the muscle; behind the integers the number of components and the code of each."""
     codes = PATH_INTEGERS + 1 + 2 * ip[PATH_INTEGERS]
@@ -65,7 +65,7 @@ def muscle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
             _fibre_component(k, code, ip, par, q, v, level, y, Yq, Yv)
 
 
-@njit(cache=True)
+@compiled
 def _path_component(k, code, ip, par, q, v, level, y, Yq, Yv):
     """Length, rate and tendon force: they move with the bodies."""
     if code == RATE:
@@ -84,7 +84,7 @@ def _path_component(k, code, ip, par, q, v, level, y, Yq, Yv):
         add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, by_length, Yq[k])
 
 
-@njit(cache=True)
+@compiled
 def _active_component(k, code, ip, par, q, v, u, level, y, Yq, Yv, Yu):
     """Activation and active force: they move with the activation, which is a coordinate or the input."""
     m = ip[1]
@@ -102,7 +102,7 @@ def _active_component(k, code, ip, par, q, v, u, level, y, Yq, Yv, Yu):
             Yu[k, 0] = by_a * by_input
 
 
-@njit(cache=True)
+@compiled
 def _fibre_component(k, code, ip, par, q, v, level, y, Yq, Yv):
     """Fibre length and velocity, pennation, passive force: functions of the fibre alone."""
     m = ip[1]

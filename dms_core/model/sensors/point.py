@@ -10,21 +10,21 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
 from dms_core.model.rotations import add, columns, point, point_rate, vec
 from dms_core.model.sensors.angle import rotated_acceleration
 
 
-@njit(cache=True)
+@compiled
 def point_acceleration(q, v, a, o, s):
     """Acceleration of a body-fixed point in ground axes [m/s^2]."""
     return add(vec(a, o), rotated_acceleration(q, v, a, o, s))
 
 
-@njit(cache=True)
+@compiled
 def point_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """par: s, from the centre of mass."""
     s = vec(par, 0)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from numba import njit
 from pydantic import Field, field_validator, model_validator
 
 from dms_core.errors import ModelError
+from dms_core.jit import compiled
 from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.element import Declaration, Placement, Sensor
 from dms_core.model.ropes.path import (
@@ -40,7 +40,7 @@ UNITS = {"length": "m", "rate": "m/s", "tension": "N"}
 LENGTH, RATE = 0, 1
 
 
-@njit(cache=True)
+@compiled
 def rope_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """Tables of rope_force; behind the integers the number of components and the code of each."""
     codes = PATH_INTEGERS + 1 + 2 * ip[PATH_INTEGERS]
@@ -58,7 +58,7 @@ def rope_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
             _tension(k, ip, par, q, lam, u, level, y, Yq, Yl, Yu)
 
 
-@njit(cache=True)
+@compiled
 def _tension(k, ip, par, q, lam, u, level, y, Yq, Yl, Yu):
     """Component k is the tension."""
     y[k] = lam[0] if ip[0] == MULTIPLIER else rope_tension(ip, par, q, u)

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from numba import njit
 from pydantic import Field
 
+from dms_core.jit import compiled
 from dms_core.model.control.pid import FILTER, OWN, Pid
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.joint_angle import add_angle_gradient, joint_angle
 from dms_core.model.rotations import vec
 
 
-@njit(cache=True)
+@compiled
 def tracking(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """ip, par: those of the controller."""
     f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)
