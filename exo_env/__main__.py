@@ -2,7 +2,8 @@
 
 python -m exo_env scenarios --out DIR
 python -m exo_env tune --out DIR
-python -m exo_env arm26 --excitations FILE.csv --start-deg D --start-activation A --t-end T --rtol R --sample DT --out FILE.csv
+python -m exo_env arm26 --excitations FILE.csv --start-deg D --start-activation A --t-end T --rtol R --sample DT
+                        --out FILE.csv
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def _report(summaries: list[dict], orderings: list[dict]) -> str:
 
 
 def tune(out: Path) -> int:
-    """Repeat the Ziegler-Nichols procedure on our model; prints Kc, Tc, gains and what limits them, draws Figs. 6 and 7.
+    """Repeat the Ziegler-Nichols procedure on our model: Kc, Tc, gains and what limits them, with Figs. 6 and 7.
 
     Args:
         out: folder for the figures and tuning.json; made where it is missing.
@@ -130,8 +131,13 @@ def tune(out: Path) -> int:
     found = find_gains(device, lambda kp, growth: print(f"  Kp = {kp:9.1f} N/rad: growth {growth:+.5f}", flush=True))
     critical, gains = found.critical, found.gains
     plain = ziegler_nichols(critical.Kc, critical.Tc, integral_divisor=1.0)
-    print(f"Kc = {critical.Kc:.5g} N/rad, Tc = {critical.Tc:.4g} s (the paper, on its own geometry and units: 9e6, 0.091 s)")
-    print(f"Kp = {gains.kp:.5g} N/rad, Ki = {plain.ki:.5g} / 500 = {gains.ki:.4g} N/(rad s), Kd = {gains.kd:.4g} N s/rad")
+    print(
+        f"Kc = {critical.Kc:.5g} N/rad, Tc = {critical.Tc:.4g} s "
+        "(the paper, on its own geometry and units: 9e6, 0.091 s)"
+    )
+    print(
+        f"Kp = {gains.kp:.5g} N/rad, Ki = {plain.ki:.5g} / 500 = {gains.ki:.4g} N/(rad s), Kd = {gains.kd:.4g} N s/rad"
+    )
     print(f"What limits the gain: {found.limit}.")
     _draw_steps(out, StepExperiment(device), critical.Kc, gains)
     write_json(

@@ -16,11 +16,12 @@ import numpy as np
 from dms_core import Trajectory
 from dms_core.errors import InputError, choices
 from dms_core.model import GROUND, Gravity, Input, JointAngle, JointReaction, MuscleSensor, Revolute, Steps, System
-from dms_core.model.signals import Signal
+from dms_core.model.sensors.muscle import Component
+from dms_core.model.signals import AnySignal
 from exo_env.human import ELBOW, MUSCLES, Arm, excitation_name
 
 TIME = "time_s"
-COMPONENTS = {
+COMPONENTS: dict[Component, str] = {
     "activation": "activation",
     "fibre_length": "fibre_length_m",
     "tendon_force": "tendon_force_N",
@@ -31,7 +32,7 @@ REACTION = {**{f"F{axis}": f"F{axis}_N" for axis in "xyz"}, **{f"M{axis}": f"M{a
 
 
 def bare_arm(
-    start: float, excitations: Mapping[str, Signal], start_activation: float, arm: Arm | None = None
+    start: float, excitations: Mapping[str, AnySignal], start_activation: float, arm: Arm | None = None
 ) -> System:
     """The arm at rest, fibres in static equilibrium.
 
@@ -93,7 +94,8 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
     if np.any(np.diff(times) <= 0.0):
         k = int(np.argmax(np.diff(times) <= 0.0))
         raise InputError(
-            f"excitations '{path}': {TIME} must increase from row to row, but {times[k]:g} is followed by {times[k + 1]:g}."
+            f"excitations '{path}': {TIME} must increase from row to row, "
+            f"but {times[k]:g} is followed by {times[k + 1]:g}."
         )
     return {m: Steps(times=tuple(times), values=tuple(table[m])) for m in MUSCLES}
 

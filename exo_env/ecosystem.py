@@ -28,7 +28,8 @@ from dms_core.model import (
 )
 from dms_core.model.element import Force, Sensor
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.model.signals import Signal
+from dms_core.model.sensors.muscle import Component
+from dms_core.model.signals import AnySignal
 from exo_env.exoskeleton import (
     AGONIST,
     ANTAGONIST,
@@ -46,13 +47,15 @@ from exo_env.human import ELBOW, FLEXORS, MUSCLES, Arm, Person, excitation_name
 from exo_env.settings import Settings
 
 REFERENCE, ASSISTANCE, REFLEX = "psi", "assistance", "proprioception"
-MUSCLE_COMPONENTS = ("length", "fibre_length", "fibre_velocity", "activation", "tendon_force")
+MUSCLE_COMPONENTS: tuple[Component, ...] = ("length", "fibre_length", "fibre_velocity", "activation", "tendon_force")
 
 
 class Proprioception(Settings):
     """Weak, late feedback of the elbow's angle to the muscles' excitations."""
 
-    gain: float = Field(default=0.0, ge=0.0, description="excitation of the flexors per error [1/rad]; extensors minus it")
+    gain: float = Field(
+        default=0.0, ge=0.0, description="excitation of the flexors per error [1/rad]; extensors minus it"
+    )
     delay: float = Field(default=0.06, gt=0.0, description="mean delay [s]")
 
 
@@ -72,8 +75,8 @@ class Ecosystem(Settings):
     def system(
         self,
         start: float,
-        reference: Signal,
-        excitations: Mapping[str, Signal] | None = None,
+        reference: AnySignal,
+        excitations: Mapping[str, AnySignal] | None = None,
         *,
         assistance: float = 1.0,
         start_activation: Mapping[str, float] | None = None,
@@ -92,8 +95,8 @@ class Ecosystem(Settings):
         arm = Arm(self.person)
         worn = WornExoskeleton(self.device, arm, self.misalignment, self.guide)
         machine = [] if self.machine is None else [LoadedMachine(self.machine, arm, self.weight)]
-        parts = [arm, worn, *machine]
-        commands = {m: (excitations or {}).get(m, Constant(value=MINIMUM)) for m in MUSCLES}
+        parts: list[Arm | WornExoskeleton | LoadedMachine] = [arm, worn, *machine]
+        commands: dict[str, AnySignal] = {m: (excitations or {}).get(m, Constant(value=MINIMUM)) for m in MUSCLES}
         return System(
             "human-exoskeleton ecosystem",
             bodies=[body for part in parts for body in part.bodies(start)],

@@ -33,7 +33,9 @@ from exo_env.human import Arm
 from exo_env.settings import Settings
 
 UPPER, LOWER, HINGE, GUIDE, PID = "upper_link", "lower_link", "exo_hinge", "guide", "pid"
-AGONIST, ANTAGONIST = "agonist", "antagonist"
+RopeName = Literal["agonist", "antagonist"]
+AGONIST: RopeName = "agonist"
+ANTAGONIST: RopeName = "antagonist"
 GuideKind = Literal["plane", "line", "slider"]
 
 
@@ -97,7 +99,7 @@ class Exoskeleton(Settings):
     gains: PidGains
     drift_gain: float = Field(ge=0.0, description="feedback of the error coordinate's drift [1/s]")
 
-    def moment_arm(self, rope: Literal["agonist", "antagonist"], angle: float) -> float:
+    def moment_arm(self, rope: RopeName, angle: float) -> float:
         """-dl/dtheta of a rope at a hinge angle [rad]; positive where its tension flexes [m]."""
         ends: Rope = getattr(self, rope)
         c, s = np.cos(angle), np.sin(angle)
@@ -163,12 +165,12 @@ class WornExoskeleton:
 
     def _guide(self) -> Constraint:
         """Lower link and a point of the forearm on its long axis, seen across the elbow axis."""
-        at = -self.device.guide_distance
-        common = {"name": GUIDE, "body_i": LOWER, "body_j": "forearm", "point_i": (0.0, at, 0.0)}
+        at = (0.0, -self.device.guide_distance, 0.0)
         if self.guide_kind == "plane":
-            return PlaneGuide(**common, normal_i=(1.0, 0.0, 0.0), point_j=tuple(self.axes @ (0.0, at, 0.0)))
+            across, point = (1.0, 0.0, 0.0), tuple(self.axes @ at)
+            return PlaneGuide(name=GUIDE, body_i=LOWER, body_j="forearm", normal_i=across, point_i=at, point_j=point)
         kind = LineGuide if self.guide_kind == "line" else Slider
-        return kind(**common, axis_i=(0.0, 1.0, 0.0))
+        return kind(name=GUIDE, body_i=LOWER, body_j="forearm", axis_i=(0.0, 1.0, 0.0), point_i=at)
 
     def forces(
         self, reference: str, authority: str, offset: str | None = None, *, start_tension: float | None = None
@@ -184,11 +186,13 @@ class WornExoskeleton:
         d = self.device
         forces: list[Force] = [
             JointSpringDamper(name="hinge_friction", joint=HINGE, damping=d.hinge_damping),
-            Pid(
-                name=PID, joint=HINGE, reference=reference, offset=offset, drift_gain=d.drift_gain, **dict(d.gains)
-            ),
+            Pid(name=PID, joint=HINGE, reference=reference, offset=offset, drift_gain=d.drift_gain, **dict(d.gains)),
         ]
-        for name, sign, start in ((AGONIST, 1, start_tension), (ANTAGONIST, -1, None)):
+        sides: tuple[tuple[RopeName, Literal[1, -1], float | None], ...] = (
+            (AGONIST, 1, start_tension),
+            (ANTAGONIST, -1, None),
+        )
+        for name, sign, start in sides:
             rope: Rope = getattr(d, name)
             motor = RopeActuator(
                 name=f"{name}_motor", pid=PID, sign=sign, authority=authority, start_tension=start, **dict(d.actuator)

@@ -65,16 +65,16 @@ def _draw(ax: Any, runs: Iterable[tuple[int, ScenarioRun]], course: Course) -> N
 def _legend(figure: Any, ax: Any) -> None:
     """Beside the curves, never on them."""
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2 if len(labels) == 4 else 3, frameon=False, fontsize=8)
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=2 if len(labels) == 4 else 3, frameon=False, fontsize=8
+    )
 
 
 def _sensor(name: str, factor: float = 1.0) -> Course:
     return lambda run: factor * run.values[name]
 
 
-def step_response(
-    path: Path, times: np.ndarray, angle: np.ndarray, target: float, title: str, gains: Gains
-) -> Path:
+def step_response(path: Path, times: np.ndarray, angle: np.ndarray, target: float, title: str, gains: Gains) -> Path:
     """Figs. 6 and 7: hinge angle after a step.
 
     Args:
@@ -92,7 +92,8 @@ def step_response(
     ax.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
     ax.set_ylabel("angle [deg]")
     ax.set_title(
-        f"{title}: $K_p$ = {gains.kp:.4g} N/rad, $K_i$ = {gains.ki:.3g} N/(rad s), $K_d$ = {gains.kd:.3g} N s/rad", fontsize=9
+        f"{title}: $K_p$ = {gains.kp:.4g} N/rad, $K_i$ = {gains.ki:.3g} N/(rad s), $K_d$ = {gains.kd:.3g} N s/rad",
+        fontsize=9,
     )
     _legend(figure, ax)
     return _save(figure, path)

@@ -94,6 +94,7 @@ class LoadedMachine:
     def joints(self) -> list[Constraint]:
         """Handle in the hand, weight on its rail, rope."""
         m, axis = self.machine, tuple(self.arm.axis)
+        rail = (m.high_pulley[0], m.weight_start, m.high_pulley[2])
         path = (
             PathPoint(body=HANDLE, point=(0.0, -m.handle.length, 0.0)),
             PathPoint(body=GROUND, point=m.low_pulley),
@@ -105,7 +106,7 @@ class LoadedMachine:
                 name=GRIP_JOINT, body_i="forearm", body_j=HANDLE, point_i=tuple(self.arm.grip),
                 point_j=(0.0, 0.0, 0.0), axis_i=axis, axis_j=axis,
             ),
-            Slider(name="rail", body_j=WEIGHT, axis_i=(0.0, 1.0, 0.0), point_i=(m.high_pulley[0], m.weight_start, m.high_pulley[2])),
+            Slider(name="rail", body_j=WEIGHT, axis_i=(0.0, 1.0, 0.0), point_i=rail),
             RopeLength(name=ROPE, path=path),
         ]  # fmt: skip
 

@@ -17,7 +17,7 @@ J. Biomech. 29:1223-1230:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import radians
 from typing import Any, Literal, NamedTuple
 
@@ -66,6 +66,12 @@ class Person(Settings):
     strength: float = Field(default=1.0, gt=0.0, le=5.0, description="factor on every muscle's F0 [-]")
 
 
+@cache
+def _facts() -> dict[str, Any]:
+    """The file of arm26, read once."""
+    return read_yaml(config_file(SUBJECT_FILE))
+
+
 class Segment(NamedTuple):
     """A scaled body."""
 
@@ -89,14 +95,14 @@ class Arm:
 
     person: Person = Person()
 
-    @cached_property
+    @property
     def facts(self) -> dict[str, Any]:
         """The file of arm26."""
-        return read_yaml(config_file(SUBJECT_FILE))
+        return _facts()
 
     @property
     def gravity(self) -> Vector:
-        """[m/s^2]"""
+        """In ground axes [m/s^2]."""
         x, y, z = self.facts["gravity"]
         return (x, y, z)
 
@@ -116,7 +122,11 @@ class Arm:
         joints = self.facts["joints"]
         at = np.array(joints["offset"]["point_i"])
         found = {}
-        offset = {"torso": np.zeros(3), "humerus": joints["r_shoulder"]["point_i"], "forearm": joints["r_elbow"]["point_i"]}
+        offset = {
+            "torso": np.zeros(3),
+            "humerus": joints["r_shoulder"]["point_i"],
+            "forearm": joints["r_elbow"]["point_i"],
+        }
         parent = {"torso": "torso", "humerus": "torso", "forearm": "humerus"}
         for name, their_name in BODIES.items():
             body, k, f = self.facts["bodies"][their_name], self.length_factor(name), self.mass_factor(name)
@@ -242,5 +252,3 @@ def _path_geometry(arm: Arm, points: tuple[PathPoint, ...], flexion: float) -> t
             if p.body == "forearm":
                 moment_arm -= sign * float(np.cross(arm.axis, point - arm.elbow) @ d) / segment
     return length, moment_arm
-
-

@@ -128,7 +128,11 @@ def plan(model: InternalModel, reference, duration: float) -> MotorCommand:  # n
 
 
 def _forces(
-    muscles: list[ThelenMuscle], times: np.ndarray, lengths: np.ndarray, tendon_force: np.ndarray, activations: np.ndarray
+    muscles: list[ThelenMuscle],
+    times: np.ndarray,
+    lengths: np.ndarray,
+    tendon_force: np.ndarray,
+    activations: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force along the tendon at full activation without the passive part, and that part [N], shapes (n, 6)."""
     full, passive = np.zeros(lengths.shape), np.zeros(lengths.shape)

@@ -87,7 +87,7 @@ ORDERINGS = (
         "13", f"peak elbow reaction moments of 1, 2 and 3 comparable (within a factor of {COMPARABLE:g})",
         "peak_elbow_reaction_moment_Nm", (1, 2, 3), lambda x: max(x) < COMPARABLE * min(x),
         "the elbow's reaction moment is what muscles and loads give across its axis: arm26's flexors insert beside the "
-        "forearm's long axis and twist it in proportion to their force, while the exoskeleton's guide pushes on that axis",
+        "forearm's long axis and twist it in proportion to their force; the exoskeleton's guide pushes on that axis",
     ),
     Ordering(
         "13", "peak elbow reaction force in 4 above 1, 2 and 3",

@@ -1,4 +1,4 @@
-"""The four scenarios of the paper (sect. 4.2): one exercise, four ways of sharing it between subject and exoskeleton."""
+"""The four scenarios of the paper (sect. 4.2): one exercise, shared in four ways by subject and device."""
 
 from __future__ import annotations
 
