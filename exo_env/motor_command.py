@@ -3,9 +3,10 @@
 The subject knows its arm and the load it expects in the hand over the gym rope, not the device that it wears. Along
 the reference psi(t) the elbow needs
 
-    M = J psiddot - M_gravity(psi) - M_load,   M_load = -dl/dpsi (m_w g + m_w d2l/dt2) - m_h (dz/dpsi g + ...)
+    M = (J + m_h d^2) psiddot - M_g(psi) + m_h g dy/dpsi + m_w (g + d2l/dt2) dl/dpsi
 
-with l the rope between grip and low pulley and the handle as a point of mass m_h in the grip. Of all activations that
+with J and M_g inertia and gravity's moment of the forearm, m_w the expected weight, l the rope between grip and low
+pulley, and the handle as a point of mass m_h in the grip, at the height y and the distance d from the elbow. Of all activations that
 give this moment those with the least sum of squares are taken (Crowninshield and Brand 1981; Kaplan and Heegaard 2001):
 
     min sum a_i^2,   sum r_i cos(alpha_i) F0_i (a_i fl_i fv_i + fp_i) = M,   0.01 <= a_i <= 1
@@ -19,6 +20,7 @@ muscles receive is the command times the maximum activation, at least 0.01, as a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +34,8 @@ from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
 from exo_env.gym_machine import GymMachine
 from exo_env.human import MUSCLES, Arm
 
+Course = Callable[[float], tuple[float, float, float]]
+"""t [s] -> (psi [rad], its rate [rad/s], its acceleration [rad/s^2])."""
 INTERVAL = 0.02
 """Time between samples of the command [s]; far below the time constants of muscles and the movement."""
 SWEEPS = 100
@@ -101,12 +105,12 @@ class InternalModel:
         return moment
 
 
-def plan(model: InternalModel, reference, duration: float) -> MotorCommand:  # noqa: ANN001
+def plan(model: InternalModel, reference: Course, duration: float) -> MotorCommand:
     """The command for a movement.
 
     Args:
         model: what the subject knows.
-        reference: t [s] -> (psi, its rate, its acceleration) [rad, rad/s, rad/s^2].
+        reference: the movement.
         duration: of the movement [s].
     """
     times = np.linspace(0.0, duration, round(duration / INTERVAL) + 1)

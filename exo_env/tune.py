@@ -125,6 +125,6 @@ def what_limits(device: Exoskeleton, Kc: float) -> str:
     lag, moment_arm = device.actuator.time_constant, device.moment_arm(AGONIST, START)
     return (
         f"the motors' first-order lag of {1e3 * lag:g} ms: Kc times the rope's moment arm of {1e3 * moment_arm:.1f} mm "
-        f"is {Kc * moment_arm:.0f} Nm/rad, the hinge's damping over the lag {device.hinge_damping / lag:.0f} Nm/rad, and "
-        "the passive muscles add the rest; without lag there would be no critical gain"
+        f"is {Kc * moment_arm:.0f} Nm/rad, the hinge's damping over the lag {device.hinge_damping / lag:.0f} Nm/rad, "
+        "and the passive muscles add the rest; without lag there would be no critical gain"
     )
