@@ -124,10 +124,20 @@ def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:
     )
 
 
-def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
-    """Tables of all inputs, and the compiled user functions that must be kept alive."""
+def _writer(function: Any) -> Any:
+    """The user's function of time, its three results written into an array."""
     from numba import njit
 
+    course = njit(function)
+
+    def write(t, out):  # noqa: ANN001, ANN202
+        out[0], out[1], out[2] = course(t)
+
+    return njit(write)
+
+
+def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
+    """Tables of all inputs, and the compiled user functions that must be kept alive."""
     kinds, starts, coefficients, addresses, jumps, keep = [], [], [], [], [np.zeros(0)], []
     for item in layout.system.inputs:
         signal, pointer = item.signal, 0
@@ -138,12 +148,7 @@ def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
         elif isinstance(signal, Function):
             kind = FUNCTION
             jumps.append(np.array(signal.jumps))
-            course = njit(signal.function)
-
-            def write(t, out, course=course):
-                out[0], out[1], out[2] = course(t)
-
-            compiled = njit(write)
+            compiled = _writer(signal.function)
             try:
                 pointer = address(compiled, SIGNAL, f"input '{item.name}'")
             except Exception as error:

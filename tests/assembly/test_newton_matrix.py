@@ -12,6 +12,7 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.residual import evaluate_inputs, evaluate_newton, evaluate_rates, evaluate_residual
 from dms_core.assembly.sparsity import newton_pattern, rate_pattern
 from dms_core.errors import AssemblyError, ModelError
+from dms_core.linear.rank import minimum_norm, minimum_norms
 from dms_core.model import Distance, Fixed, Gravity, PointMass, Revolute, RigidBody, Spherical, System
 from dms_core.model.frames import quaternion
 from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate
@@ -255,6 +256,15 @@ def test_multipliers_of_redundant_constraints_are_those_of_least_norm():
     G = model.constraint_jacobian(trajectory.q[-1])[2]
     shortest = np.linalg.lstsq(G.T, G.T @ lam, rcond=1e-10)[0]
     np.testing.assert_allclose(lam, shortest, atol=1e-10)
+
+
+def test_multipliers_of_many_states_at_once_are_those_of_each():
+    """Ranks and sizes of rows mixed; against the singular value decomposition of one matrix."""
+    rng = np.random.default_rng(3)
+    G = np.stack([rng.normal(size=(9, r)) @ rng.normal(size=(r, 7)) * 10.0**k for k, r in enumerate((7, 5, 3, 1))])
+    lam = rng.normal(size=(4, 9))
+    for k, best in enumerate(minimum_norms(G, lam)):
+        np.testing.assert_allclose(best, minimum_norm(G[k], lam[k]), atol=1e-10)
 
 
 def test_redundant_rows_do_not_change_the_motion():

@@ -128,7 +128,7 @@ def test_fixed_steps_land_on_the_end(model, t_end):
 
 
 def test_fixed_steps_survive_odd_pieces(model, exact):
-    """Calls of `advance` that cut steps short cost no order: the next step is up to fifty times longer than the last."""
+    """Calls of `advance` that cut steps short cost no order: the next step is many times longer than the last."""
     simulation = Simulation(model, SolverOptions(fixed_step=1e-3))
     for t in np.arange(0.01037, T_END, 0.01037):
         assert simulation.advance(t) is Result.SUCCESS
