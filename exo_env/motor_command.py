@@ -6,8 +6,9 @@ the reference psi(t) the elbow needs
     M = (J + m_h d^2) psiddot - M_g(psi) + m_h g dy/dpsi + m_w (g + d2l/dt2) dl/dpsi
 
 with J and M_g inertia and gravity's moment of the forearm, m_w the expected weight, l the rope between grip and low
-pulley, and the handle as a point of mass m_h in the grip, at the height y and the distance d from the elbow. Of all activations that
-give this moment those with the least sum of squares are taken (Crowninshield and Brand 1981; Kaplan and Heegaard 2001):
+pulley, and the handle as a point of mass m_h in the grip, at the height y and the distance d from the elbow. Of all
+activations that give this moment those with the least sum of squares are taken (Crowninshield and Brand 1981; Kaplan
+and Heegaard 2001):
 
     min sum a_i^2,   sum r_i cos(alpha_i) F0_i (a_i fl_i fv_i + fp_i) = M,   0.01 <= a_i <= 1
 

@@ -61,6 +61,12 @@ ORDERINGS = (
         "peak_shortfall_deg", (1,), lambda x: SHORT[0] < x[0] < SHORT[1],
     ),
     Ordering(
+        "9", "1 falls shortest of all: its peak is farther below the reference than those of 2, 3 and 4",
+        "peak_shortfall_deg", (1, 2, 3, 4), lambda x: x[0] > max(x[1:]),
+        "the integral gain, reduced 500-fold as in the paper, does not build up within the exercise, so that under "
+        "10 kg the controller keeps the error that its proportional gain needs to hold the load",
+    ),
+    Ordering(
         "10a", "biceps works more in the lifting half: mean force lifting over release above 1 in 1, 3 and 4",
         "biceps_lifting_over_release", (1, 3, 4), lambda x: min(x) > 1.0, ONE_MOMENT,
     ),
