@@ -21,7 +21,7 @@ from dms_core.assembly.model import Model  # noqa: E402
 from dms_core.errors import AssemblyError, DmsError, InputError, ModelError, SimulationError  # noqa: E402
 from dms_core.model.system import System  # noqa: E402
 from dms_core.results import Result, SolveStats, States, Trajectory  # noqa: E402
-from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate  # noqa: E402
+from dms_core.simulation.dynamics import Simulation, SolverOptions, World, simulate  # noqa: E402
 
 __all__ = [
     "AssemblyError",
@@ -37,5 +37,6 @@ __all__ = [
     "States",
     "System",
     "Trajectory",
+    "World",
     "simulate",
 ]

@@ -119,3 +119,23 @@ def _placed(element: DynamicElement | Constraint | Sensor, system: System) -> tu
     except ModelError as error:
         who = f"{element.kind} '{element.name}'"
         raise ModelError(str(error) if who in str(error) else f"{who}: {error}") from None
+
+
+def same_structure(one: Layout, other: Layout) -> bool:
+    """True if two layouts differ in numbers only: same names, same calls with the same indices and integers."""
+    if one.names != other.names or one.row_names != other.row_names or one.outputs != other.outputs:
+        return False
+    pairs = [(one.dynamics, other.dynamics), (one.constraints, other.constraints), (one.sensors, other.sensors)]
+    return one.input_index == other.input_index and all(
+        len(a) == len(b) and all(_same_call(x, y) for x, y in zip(a, b, strict=True)) for a, b in pairs
+    )
+
+
+def _same_call(one: Call, other: Call) -> bool:
+    """True if two calls differ in their numbers at most."""
+    return (
+        type(one.element) is type(other.element)
+        and np.array_equal(one.iq, other.iq)
+        and np.array_equal(one.iu, other.iu)
+        and tuple(one.placement.integers) == tuple(other.placement.integers)
+    )

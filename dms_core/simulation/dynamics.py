@@ -86,8 +86,8 @@ class SolverOptions:
         )  # fmt: skip
 
 
-class Simulation:
-    """One world that is advanced in time, with inputs set between calls.
+class World:
+    """One world that is advanced in time, with inputs set between calls; it remembers the present only.
 
     Args:
         model: a compiled Model, or a System to compile.
@@ -101,9 +101,7 @@ class Simulation:
         self._tables: Packed = self.model.tables
         self._world = self.model.new_state()
         self.state: State = self._world.values
-        self._rows: list[np.ndarray] = []
         self._buffer = np.zeros((BUFFER_ROWS, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
-        self._settings: dict[int, list[tuple[float, float]]] = {}
         self.result = Result.SUCCESS
 
     @property
@@ -125,13 +123,16 @@ class Simulation:
             )
         if not math.isfinite(value):
             raise InputError(f"input '{name}' = {value}; a finite number is wanted.")
+        self._hold(k, float(value))
+
+    def _hold(self, k: int, value: float) -> bool:
+        """Set input k, unchecked; True if that is a jump."""
         row = self.state.signals.ptr[k]
-        if self.state.signals.c[row, 0] != value:
-            self._settings.setdefault(k, [(-1.0, float(self.state.signals.c[row, 0]))]).append(
-                (self.time, float(value))
-            )
-            self.state.signals.c[row, 0] = value
-            self.state.counts[RESTART] = 1
+        if self.state.signals.c[row, 0] == value:
+            return False
+        self.state.signals.c[row, 0] = value
+        self.state.counts[RESTART] = 1
+        return True
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.
@@ -159,10 +160,13 @@ class Simulation:
             code, count = step_control.advance(
                 self._tables.table, self._world.table, self._numbers, t_end, self._buffer, 0
             )
-            self._rows.append(self._buffer[:count].copy())
+            self._keep(self._buffer[:count])
             if progress is not None:
                 progress(self.time)
         return code
+
+    def _keep(self, rows: np.ndarray) -> None:
+        """What becomes of recorded steps: nothing here."""
 
     def _reorder(self) -> bool:
         """Choose rows and pivots anew where the old ones became singular; False if nothing helps."""
@@ -175,6 +179,19 @@ class Simulation:
         self.state = self._world.values
         return True
 
+    def read(self, out: np.ndarray | None = None) -> np.ndarray:
+        """All sensors at the present time, in the order of model.layout.outputs, shape (n_y,); into `out` if given.
+
+        Multipliers are those of the independent rows: with redundant constraints, reactions here are not of least norm.
+        """
+        s = self.state
+        y = np.empty(len(self.model.layout.outputs)) if out is None else out
+        present = np.zeros(1, bool)
+        self.model.measure_into(
+            self._world.table, np.array([self.time]), s.q[None], s.v[None], s.vd[None], s.lam[None], present, y[None]
+        )
+        return y
+
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
         c, x = self.state.counts, self.state.largest
@@ -183,6 +200,30 @@ class Simulation:
             int(c[RESTARTS]), float(x[PHI]), float(x[PHI_V]), float(x[MU]),
             float(x[H_LEAST]) if c[STEPS] else 0.0, float(x[H_MOST]),
         )  # fmt: skip
+
+
+class Simulation(World):
+    """A world that remembers: everything computed is there as a trajectory.
+
+    Args:
+        model: a compiled Model, or a System to compile.
+        options: solver options.
+    """
+
+    def __init__(self, model: Model | System, options: SolverOptions | None = None) -> None:
+        super().__init__(model, options)
+        self._rows: list[np.ndarray] = []
+        self._settings: dict[int, list[tuple[float, float]]] = {}
+
+    def _hold(self, k: int, value: float) -> bool:
+        before = float(self.state.signals.c[self.state.signals.ptr[k], 0])
+        jump = super()._hold(k, value)
+        if jump:
+            self._settings.setdefault(k, [(-1.0, before)]).append((self.time, value))
+        return jump
+
+    def _keep(self, rows: np.ndarray) -> None:
+        self._rows.append(rows.copy())
 
     def trajectory(self) -> Trajectory:
         """Everything computed so far."""

@@ -38,8 +38,12 @@ class Start(NamedTuple):
     """Largest change of a declared coordinate by assembly."""
 
 
-def assemble(model: Model) -> Start:
+def assemble(model: Model, known: Start | None = None) -> Start:
     """Bring the declared start onto the constraints.
+
+    Args:
+        model: laid out, not yet ordered.
+        known: start of a model of the same structure, whose independent rows are taken over.
 
     Raises:
         AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint.
@@ -47,7 +51,7 @@ def assemble(model: Model) -> Start:
     q, v = (x[: model.n_q].copy() for x in model.layout.start())
     declared = q.copy()
     q = _closed(model, q, model.layout.system.name)
-    active, redundant, singular_values = _rows(model, q)
+    active, redundant, singular_values = _rows(model, q) if known is None else known[2:5]
     v = _velocities(model, q, v)
     _start_states(model, q, v)
     return Start(q, v, active, redundant, singular_values, float(np.max(np.abs(q - declared))))
