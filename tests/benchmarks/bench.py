@@ -19,7 +19,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from dms_core import Model, Simulation, SolverOptions, System, simulate
-from dms_core.model import Gravity, Revolute, RigidBody
+from dms_core.model import Constant, Gravity, Revolute, RigidBody
+from exo_env.arm26 import bare_arm
+from exo_env.human import MUSCLES
+from exo_env.scenarios import build, load_scenarios
 from tests.benchmarks.calibration import normalised
 
 CHAIN_TIP = {
@@ -109,20 +112,19 @@ def bench_precision(title: str, model: Model, angle: str, seconds: float, tolera
 
 def bench_arm(tolerances: list[float]) -> None:
     """arm26 alone, elbow free, six muscles."""
-    from exo_env.arm26 import bare_arm
-
     for name, (start, excitations, peer) in ARM.items():
-        system = bare_arm(start, 0.02, lambda muscle, x=excitations: x[muscle[:3]])
-        bench_precision(f"arm26, {name}, via points", Model(system), "elbow.angle", 1.0, tolerances, f"OpenSim {peer}")
+        commands = {muscle: Constant(value=excitations[muscle[:3]]) for muscle in MUSCLES}
+        system = bare_arm(start, commands, 0.02)
+        bench_precision(f"arm26, {name}, via points", Model(system), "elbow_angle.angle", 1.0, tolerances, f"OpenSim {peer}")
 
 
 def bench_system(tolerances: list[float]) -> None:
     """The full system of scenario 3."""
-    from exo_env.scenarios import scenario_system
-
-    model, seconds = scenario_system(3)
+    exercise, scenarios = load_scenarios()
+    model, _ = build(scenarios[2], exercise)
     peer = "Exudyn, a comparable system of 8 bodies: 68 ms at 1.2e-4 rad"
-    bench_precision("Subject, exoskeleton and gym machine, scenario 3", model, "elbow.angle", seconds, tolerances, peer)
+    title = "Subject, exoskeleton and gym machine, scenario 3"
+    bench_precision(title, model, "elbow_angle.angle", exercise.duration, tolerances, peer)
 
 
 def main(arguments: list[str] | None = None) -> None:
