@@ -114,8 +114,8 @@ def bench_arm(tolerances: list[float]) -> None:
     """arm26 alone, elbow free, six muscles."""
     for name, (start, excitations, peer) in ARM.items():
         commands = {muscle: Constant(value=excitations[muscle[:3]]) for muscle in MUSCLES}
-        system = bare_arm(start, commands, 0.02)
-        bench_precision(f"arm26, {name}, via points", Model(system), "elbow_angle.angle", 1.0, tolerances, f"OpenSim {peer}")
+        model = Model(bare_arm(start, commands, 0.02))
+        bench_precision(f"arm26, {name}, via points", model, "elbow_angle.angle", 1.0, tolerances, f"OpenSim {peer}")
 
 
 def bench_system(tolerances: list[float]) -> None:
