@@ -31,8 +31,6 @@ MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
 SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping."""
-POOR = 0.4
-"""Contraction above which even a matrix of this stage is evaluated anew at the present iterate."""
 SINGULAR_PIVOT = 1e-14
 """Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
 C0_CHANGE = 0.1
@@ -228,8 +226,9 @@ def newton(m, s, o, c0):
             return STALE_MATRIX, k
         x_before[:] = x
         before = norm
-        if k > 0 and fresh and contraction > POOR:
-            # A kink lies between guess and solution (a fibre stops shortening): the matrix of the far side is needed.
+        if k > 0 and fresh and norm * contraction ** (MAX_ITERATIONS - 1 - k) > o.newton_tol:
+            # Too slow to end in time (Hairer and Wanner 1996, IV.8), as where a kink lies between guess and solution: a
+            # fibre that stops shortening needs the matrix of the far side.
             if not refresh(m, s, c0):
                 return SINGULAR, k
         else:

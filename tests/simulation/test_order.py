@@ -207,7 +207,7 @@ def test_advance_in_pieces_is_the_same_run_to_tolerance(model, exact):
     ("options", "result", "sentence"),
     [
         (SolverOptions(max_steps=50), Result.TOO_MANY_STEPS, "raise max_steps"),
-        (SolverOptions(fixed_step=0.09), Result.NEWTON_FAILED, "smaller fixed step"),
+        (SolverOptions(fixed_step=0.2), Result.NEWTON_FAILED, "smaller fixed step"),
     ],
 )
 def test_a_run_that_fails_gives_what_it_has(model, options, result, sentence):
