@@ -39,7 +39,7 @@ class Start(NamedTuple):
     singular_values: np.ndarray
     """Of phi_q at the start, largest first."""
     moved: float
-    """Largest change of a declared coordinate by assembly."""
+    """Largest change of a declared coordinate by closing the constraints; states that elements set do not count."""
 
 
 def assemble(model: Model, known: Start | None = None) -> Start:
@@ -57,10 +57,11 @@ def assemble(model: Model, known: Start | None = None) -> Start:
     declared = q.copy()
     q = _closed(model, q, model.layout.system.name)
     _check_turns(model, q)
+    moved = float(np.max(np.abs(q - declared)))
     active, redundant, singular_values = _rows(model, q) if known is None else known[2:5]
     v = _velocities(model, q, v)
     _start_states(model, q, v)
-    return Start(q, v, active, redundant, singular_values, float(np.max(np.abs(q - declared))))
+    return Start(q, v, active, redundant, singular_values, moved)
 
 
 def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
