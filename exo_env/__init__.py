@@ -1,6 +1,9 @@
 """The human-exoskeleton ecosystem of the paper (sect. 4): subject, elbow exoskeleton and gym machine in one system.
 
-Nothing is imported here, so that `import exo_env` is quick; take what you need from the modules:
+Importing it registers the environment exo/ElbowLift-v0 with Gymnasium and loads nothing else; take what you need from
+the modules:
+
+    lift_env                          the environment; actions, observations, rewards, events, repetition, episode
 
     human, exoskeleton, gym_machine   the three subsystems of Fig. 8, from configs/
     ecosystem                         joins them into one dms_core System
@@ -8,3 +11,7 @@ Nothing is imported here, so that `import exo_env` is quick; take what you need 
     scenarios, orderings, tune        the paper's use cases and its controller tuning
     arm26                             the bare arm under a table of excitations
 """
+
+from gymnasium.envs.registration import register
+
+register(id="exo/ElbowLift-v0", entry_point="exo_env.lift_env:ElbowLiftEnv")

@@ -1,0 +1,139 @@
+"""What an action in [-1, 1]^2 does: a drive is the part of the model behind the ropes, and how actions become inputs.
+
+rope_tension: both tensions are commanded. a = -1 is a slack rope, a = 1 the largest tension; the command's change per
+period is limited, and the motor follows it with a first-order lag inside the DAE.
+
+pid_setpoint: the device's own PID holds psi + offset; a_0 shifts its setpoint through a second-order filter inside the
+DAE (psi must be C1 for the controller), a_1 sets its share of authority, whose change is limited as well.
+
+In both the PID's states are coordinates of the DAE; with rope_tension no rope listens to them.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dms_core.errors import InputError, choices
+from dms_core.model import Constant, Input, ReferenceFilter, RopeActuator
+from dms_core.model.element import Force
+from exo_env.exoskeleton import AGONIST, ANTAGONIST, WornExoskeleton
+from exo_env.settings import Settings
+
+REFERENCE, ASSISTANCE = "psi", "assistance"
+COMMANDS = (f"{AGONIST}_command", f"{ANTAGONIST}_command")
+SETPOINT, FILTER = "setpoint", "setpoint_filter"
+ActionMode = Literal["rope_tension", "pid_setpoint"]
+
+
+class RopeTension(Settings):
+    """Drive of action mode 'rope_tension'."""
+
+    names: ClassVar[tuple[str, str]] = ("agonist tension", "antagonist tension")
+    inputs: ClassVar[tuple[str, str]] = COMMANDS
+    time_constant: float = Field(
+        default=0.02, ge=0.001, le=0.5, description="lag of the tension [s]; assumed: 8 Hz, of a series elastic drive"
+    )
+    max_tension: float = Field(
+        default=200.0, gt=1.0, le=1500.0, description="largest command [N]; assumed: holds 2 kg in a limp arm"
+    )
+    rate_limit: float = Field(default=2000.0, gt=0.0, description="largest change of a command [N/s]; assumed")
+
+    def largest(self, worn: WornExoskeleton) -> float:
+        """Largest tension of a motor [N]."""
+        return self.max_tension
+
+    def start(self, holding_tension: float) -> np.ndarray:
+        """Values of the inputs at the start: the arm is held by the agonist."""
+        return np.array([min(max(holding_tension, 0.0), self.max_tension), 0.0])
+
+    def held(self, action: np.ndarray, before: np.ndarray, period: float) -> np.ndarray:
+        """Values of the inputs over the coming period [N], shape (2,)."""
+        wanted, change = 0.5 * (action + 1.0) * self.max_tension, self.rate_limit * period
+        return np.clip(wanted, before - change, before + change)
+
+    def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
+        """The device with motors that follow the commands."""
+        names = dict(zip((f"{AGONIST}_motor", f"{ANTAGONIST}_motor"), COMMANDS, strict=True))
+        return [
+            RopeActuator(
+                name=f.name, command=names[f.name], time_constant=self.time_constant, max_tension=self.max_tension,
+                start_tension=float(start[COMMANDS.index(names[f.name])]),
+            )
+            if isinstance(f, RopeActuator)
+            else f
+            for f in worn.forces(REFERENCE, ASSISTANCE)
+        ]  # fmt: skip
+
+
+class PidSetpoint(Settings):
+    """Drive of action mode 'pid_setpoint'."""
+
+    names: ClassVar[tuple[str, str]] = ("setpoint change", "authority")
+    inputs: ClassVar[tuple[str, str]] = (SETPOINT, ASSISTANCE)
+    setpoint_range: float = Field(default=0.2, gt=0.0, le=1.0, description="largest setpoint change [rad]; assumed")
+    filter_frequency: float = Field(default=20.0, gt=0.0, le=200.0, description="of the setpoint filter [rad/s]")
+    filter_damping: float = Field(default=1.0, gt=0.0, le=5.0, description="damping ratio of the filter [-]")
+    authority_rate: float = Field(default=10.0, gt=0.0, description="largest change of the authority [1/s]; assumed")
+
+    def largest(self, worn: WornExoskeleton) -> float:
+        """Largest tension of a motor [N]."""
+        return worn.device.actuator.max_tension
+
+    def start(self, holding_tension: float) -> np.ndarray:
+        """Values of the inputs at the start: no change, and half of the authority, as for an action of zeros."""
+        return np.array([0.0, 0.5])
+
+    def held(self, action: np.ndarray, before: np.ndarray, period: float) -> np.ndarray:
+        """Values of the inputs over the coming period: setpoint change [rad] and authority [-], shape (2,)."""
+        change = self.authority_rate * period
+        wanted = 0.5 * (action[1] + 1.0)
+        return np.array([self.setpoint_range * action[0], min(max(wanted, before[1] - change), before[1] + change)])
+
+    def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
+        """The filter and the device, whose controller reads it."""
+        smooth = ReferenceFilter(
+            name=FILTER, input=SETPOINT, frequency=self.filter_frequency, damping=self.filter_damping
+        )
+        return [smooth, *worn.forces(REFERENCE, ASSISTANCE, f"{FILTER}.setpoint")]
+
+
+Drive = RopeTension | PidSetpoint
+DRIVES: dict[str, type[Drive]] = {"rope_tension": RopeTension, "pid_setpoint": PidSetpoint}
+
+
+def drive(mode: str, settings: dict | None) -> Drive:
+    """The drive of an action mode, with some of its settings.
+
+    Raises:
+        InputError: the mode is unknown, or a setting is.
+    """
+    if mode not in DRIVES:
+        raise InputError(f"action_mode = {mode!r}; one of {choices(DRIVES)} is wanted.")
+    return DRIVES[mode](**(settings or {}))
+
+
+def drive_inputs(used: Drive, start: np.ndarray) -> list[Input]:
+    """The inputs of a drive, held at their start values."""
+    return [
+        Input(name=name, signal=Constant(value=float(x))) for name, x in zip(used.inputs, start, strict=True)
+    ]  # fmt: skip
+
+
+def checked_action(action: object) -> np.ndarray:
+    """An action as two finite numbers, clipped to [-1, 1].
+
+    Raises:
+        InputError: it has another shape, or a number is not finite.
+    """
+    try:
+        found = np.asarray(action, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"action = {action!r}; two numbers from -1 to 1 are wanted.") from None
+    if found.shape != (2,):
+        raise InputError(f"action has shape {found.shape}; two numbers from -1 to 1, shape (2,), are wanted.")
+    if not np.isfinite(found).all():
+        raise InputError(f"action = {found.tolist()}; finite numbers are wanted (they are clipped to -1 to 1).")
+    return np.clip(found, -1.0, 1.0)

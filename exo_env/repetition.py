@@ -1,0 +1,99 @@
+"""One repetition of the exercise: rest, flexion, pause, return, each move of minimum jerk (Flash and Hogan 1985).
+
+Angles stay between 20 and 100 degrees, where the muscles' straight lines have leverage (human.py). Which angles,
+durations and pauses occur is a distribution a field, as in a population of patients; all of them are assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dms_core.errors import InputError
+from dms_core.model import MinimumJerk
+from exo_env.distributions import distribution
+from exo_env.settings import Settings
+
+LOWEST, HIGHEST = 20.0, 100.0
+"""Elbow angles between which the exercise stays [deg]."""
+
+
+class Repetition(Settings):
+    """One movement of the reference."""
+
+    start_deg: float = Field(default=25.0, ge=LOWEST, le=HIGHEST, description="angle at rest [deg]")
+    amplitude_deg: float = Field(default=60.0, gt=0.0, le=HIGHEST - LOWEST, description="of the flexion [deg]")
+    rest: float = Field(default=0.4, ge=0.0, le=10.0, description="before the flexion [s]")
+    duration: float = Field(default=2.0, ge=0.3, le=20.0, description="of each of the two moves [s]")
+    pause: float = Field(default=0.5, gt=0.0, le=10.0, description="at the top [s]")
+
+    @model_validator(mode="after")
+    def _within_leverage(self):
+        if self.start_deg + self.amplitude_deg > HIGHEST + 1e-9:
+            raise ValueError(
+                f"start_deg = {self.start_deg} and amplitude_deg = {self.amplitude_deg} lead to "
+                f"{self.start_deg + self.amplitude_deg} deg; at most {HIGHEST} deg are wanted"
+            )
+        return self
+
+    @property
+    def signal(self) -> MinimumJerk:
+        """psi(t) [rad]."""
+        low, high = np.radians(self.start_deg), np.radians(self.start_deg + self.amplitude_deg)
+        times = np.cumsum([self.rest, self.duration, self.pause, self.duration])
+        return MinimumJerk(times=tuple(times), values=(low, high, high, low))
+
+    def course(self, times: np.ndarray) -> np.ndarray:
+        """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at times [s] in rising order, shape (n, 3)."""
+        pieces = self.signal.pieces()
+        k = np.maximum(np.searchsorted(pieces.t, times, side="right") - 1, 0)
+        x, c = times - pieces.t[k], pieces.c[k]
+        powers = np.arange(c.shape[1])
+        found = np.empty((len(times), 3))
+        for order in range(3):
+            found[:, order] = np.sum(c * x[:, None] ** powers, axis=1)
+            c = c[:, 1:] * powers[1:]
+            powers = powers[:-1]
+        return found
+
+
+class Repetitions(Settings):
+    """Repetitions to draw from: a distribution for each field of `Repetition`, see distributions.py."""
+
+    start_deg: Any = {"uniform": [20.0, 35.0]}
+    amplitude_deg: Any = {"uniform": [40.0, 65.0]}
+    rest: Any = 0.4
+    duration: Any = {"uniform": [1.6, 2.2]}
+    pause: Any = {"uniform": [0.3, 0.8]}
+
+    @model_validator(mode="after")
+    def _possible(self):
+        """Both ends of every spread must be repetitions."""
+        for end in (0, -1):
+            Repetition(**{name: self._spread(name).limits()[end] for name in Repetition.model_fields})
+        return self
+
+    @classmethod
+    def of(cls, source: Mapping[str, Any] | Repetition | Self | None) -> Repetitions:
+        """From what a user gives: some fields of it, one repetition, or None for the defaults."""
+        if isinstance(source, Repetitions):
+            return source
+        if isinstance(source, Repetition):
+            return cls(**dict(source))
+        if source is None or isinstance(source, Mapping):
+            return cls(**(source or {}))
+        fields = ", ".join(Repetition.model_fields)
+        raise InputError(f"reference = {source!r}; a mapping with some of {fields} is wanted, or None.")
+
+    def _spread(self, name: str) -> Any:
+        try:
+            return distribution(getattr(self, name))
+        except InputError as error:
+            raise InputError(f"reference: {name}: {error}") from None
+
+    def sample(self, generator: np.random.Generator) -> Repetition:
+        """A repetition; one number is drawn for each field."""
+        return Repetition(**{name: self._spread(name).quantile(generator.random()) for name in Repetition.model_fields})
