@@ -46,7 +46,7 @@ def _constraints(m, s):
 
 @compiled
 def _newton_matrix(m, s):
-    """Residual and factorised Newton matrix for c0 = clock[C0_FACTORED]; clock[PIVOT] is its smallest relative pivot."""
+    """Residual, factorised Newton matrix for c0 = clock[C0_FACTORED], and clock[PIVOT], its smallest relative pivot."""
     clock, values, w = floats(s, STATE.clock), floats(s, STATE.newton_values), inner(s, STATE.w)
     dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
     evaluate_newton(dynamics, constraints, inner(m, MODEL.newton), w, clock[C0_FACTORED], values)
