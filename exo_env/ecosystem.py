@@ -9,7 +9,7 @@ Inputs: "psi" the reference [rad], "assistance" the authority of the controller 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from pydantic import Field
 
@@ -81,6 +81,9 @@ class Ecosystem(Settings):
         assistance: float = 1.0,
         start_activation: Mapping[str, float] | None = None,
         start_tension: float | None = None,
+        muscle_times: Mapping[str, float] | None = None,
+        device_forces: Callable[[WornExoskeleton], list[Force]] | None = None,
+        device_inputs: Sequence[Input] | None = None,
     ) -> System:
         """The declared system, at rest at the start.
 
@@ -91,6 +94,9 @@ class Ecosystem(Settings):
             assistance: authority of the controller, 0 to 1 [-].
             start_activation: activation of each muscle at the start [-]; default: the minimum.
             start_tension: of the agonist rope [N]; default: that of a command without error.
+            muscle_times: activation and deactivation time constants of every muscle, as fields of ThelenMuscle [s].
+            device_forces: controller, motors and ropes of the worn device; default: its own PID on both ropes.
+            device_inputs: inputs that these read beside the reference; default: the authority.
         """
         arm = Arm(self.person)
         worn = WornExoskeleton(self.device, arm, self.misalignment, self.guide)
@@ -103,19 +109,23 @@ class Ecosystem(Settings):
             constraints=[joint for part in parts for joint in part.joints()],
             forces=[
                 Gravity(name="gravity", acceleration=arm.gravity),
-                *self._muscles(arm, start_activation or {}),
-                *worn.forces(REFERENCE, ASSISTANCE, start_tension=start_tension),
+                *self._muscles(arm, start_activation or {}, muscle_times or {}),
+                *(
+                    device_forces(worn)
+                    if device_forces
+                    else worn.forces(REFERENCE, ASSISTANCE, start_tension=start_tension)
+                ),
                 *(force for part in machine for force in part.forces()),
             ],
             sensors=sensors(gym=self.machine is not None),
             inputs=[
                 Input(name=REFERENCE, signal=reference),
-                Input(name=ASSISTANCE, signal=Constant(value=assistance)),
+                *(device_inputs or [Input(name=ASSISTANCE, signal=Constant(value=assistance))]),
                 *(Input(name=excitation_name(m), signal=s) for m, s in commands.items()),
             ],
         )
 
-    def _muscles(self, arm: Arm, start_activation: Mapping[str, float]) -> list[Force]:
+    def _muscles(self, arm: Arm, start_activation: Mapping[str, float], times: Mapping[str, float]) -> list[Force]:
         """The six muscles, behind the feedback that they read."""
         p = self.proprioception
         forces: list[Force] = []
@@ -123,7 +133,7 @@ class Ecosystem(Settings):
             forces.append(DelayedError(name=REFLEX, joint=ELBOW, reference=REFERENCE, delay=p.delay))
         for m in MUSCLES:
             reflex = {"reflex": f"{REFLEX}.error", "reflex_gain": p.gain if m in FLEXORS else -p.gain} if p.gain else {}
-            forces.append(arm.muscle(m, start_activation=start_activation.get(m, MINIMUM), **reflex))
+            forces.append(arm.muscle(m, start_activation=start_activation.get(m, MINIMUM), **reflex, **times))
         return forces
 
 

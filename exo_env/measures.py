@@ -45,6 +45,7 @@ def summary(run: ScenarioRun) -> dict[str, Any]:
         "peak_guide_force_N": np.sqrt(sum(y[f"guide_force.F{axis}"] ** 2 for axis in "xyz")).max(),
         "lowest_gym_rope_tension_N": lowest,
         "pid_drift_rad": np.abs(y["tracking.drift"]).max(),
+        "command_moment_shortage_Nm": run.command.shortage,
     }
     return {
         "title": run.scenario.title,

@@ -20,18 +20,15 @@ muscles receive is the command times the maximum activation, at least 0.01, as a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from dms_core.errors import InputError
-from dms_core.model import Spline, ThelenMuscle
+from dms_core.model import Spline
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.model.muscles.muscle import fibre_state, pennation_cosine
-from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
+from exo_env.command_kernel import ArmTable, LoadTable, needed_moment, planned
 from exo_env.gym_machine import GymMachine
 from exo_env.human import MUSCLES, Arm
 
@@ -86,24 +83,36 @@ class InternalModel:
     machine: GymMachine
     expected_load: float
 
-    def height_and_rope(self, flexion: float) -> tuple[float, float]:
-        """(height of the grip [m], rope between grip and low pulley [m])."""
-        grip = self.arm.elbow + self.arm.rotation(flexion) @ self.arm.grip
-        return float(grip[1]), float(np.linalg.norm(np.array(self.machine.low_pulley) - grip))
+    def arm_table(self) -> ArmTable:
+        """The arm for the compiled iteration."""
+        paths = [self.arm.path(m, welded=True) for m in MUSCLES]
+        points = [p for path in paths for p in path]
+        return ArmTable(
+            muscles=np.array([self.arm.muscle(m).numbers() for m in MUSCLES]),
+            first=np.cumsum([0, *(len(path) for path in paths)]),
+            moving=np.array([p.body == "forearm" for p in points]),
+            points=np.array([p.point for p in points]),
+            axis=np.ascontiguousarray(self.arm.axis),
+            elbow=np.ascontiguousarray(self.arm.elbow),
+        )
 
-    def wanted_moment(self, psi: np.ndarray, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-        """Moment that the muscles must give along a movement [Nm], shape (n,)."""
-        g, handle = float(np.linalg.norm(self.arm.gravity)), self.machine.handle.mass
-        h, moment = 1e-4, np.zeros(len(psi))
-        for k, (x, v, a) in enumerate(zip(psi, rate, acceleration, strict=True)):
-            near, here, far = (np.array(self.height_and_rope(x + d)) for d in (-h, 0.0, h))
-            slope, bend = (far - near) / (2 * h), (far - 2 * here + near) / h**2
-            rise = slope * a + bend * v * v
-            # A longer rope lifts the weight; the handle's inertia is that of a point in the grip.
-            weight = slope[1] * self.expected_load * (g + rise[1])
-            lifted = handle * (slope[0] * g + float(self.arm.grip @ self.arm.grip) * a)
-            moment[k] = self.arm.inertia_about_elbow() * a - self.arm.gravity_moment(x) + weight + lifted
-        return moment
+    def load_table(self) -> LoadTable:
+        """What it carries, for the compiled iteration."""
+        forearm, handle = self.arm.segments["forearm"], self.machine.handle
+        return LoadTable(
+            inertia=self.arm.inertia_about_elbow(),
+            mass=float(forearm.mass),
+            centre_of_mass=forearm.centre_of_mass,
+            grip=self.arm.grip,
+            handle=handle.mass,
+            weight=float(self.expected_load),
+            pulley=np.array(self.machine.low_pulley),
+            gravity=np.array(self.arm.gravity),
+        )
+
+    def resting_moment(self, flexion: float) -> float:
+        """Moment that must be given about the elbow to hold arm and load at rest [Nm]."""
+        return needed_moment(self.arm_table(), self.load_table(), flexion, 0.0, 0.0)
 
 
 def plan(model: InternalModel, reference: Course, duration: float) -> MotorCommand:
@@ -115,77 +124,20 @@ def plan(model: InternalModel, reference: Course, duration: float) -> MotorComma
         duration: of the movement [s].
     """
     times = np.linspace(0.0, duration, round(duration / INTERVAL) + 1)
-    psi, rate, acceleration = np.array([reference(t) for t in times]).T
-    moment = model.wanted_moment(psi, rate, acceleration)
-    muscles = [model.arm.muscle(m) for m in MUSCLES]
-    geometry = np.array([[model.arm.muscle_geometry(m, x) for m in MUSCLES] for x in psi])
-    lengths, arms = geometry[..., 0], geometry[..., 1]
-    activations, tendon_force = np.full(lengths.shape, MINIMUM), np.zeros(lengths.shape)
-    shortage = np.zeros(len(times))
-    for _ in range(SWEEPS):
-        before = activations
-        full, passive = _forces(muscles, times, lengths, tendon_force, activations)
-        activations, shortage = _least_squares(moment - np.sum(arms * passive, axis=1), arms * full)
-        tendon_force = tendon_force + RELAXATION * (activations * full + passive - tendon_force)
-        if np.max(np.abs(activations - before)) < SETTLED:
-            break
-    return MotorCommand(times, activations, moment, float(np.max(np.abs(shortage))))
+    return plan_course(model, times, np.array([reference(t) for t in times]))
 
 
-def _forces(
-    muscles: list[ThelenMuscle],
-    times: np.ndarray,
-    lengths: np.ndarray,
-    tendon_force: np.ndarray,
-    activations: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Force along the tendon at full activation without the passive part, and that part [N], shapes (n, 6)."""
-    full, passive = np.zeros(lengths.shape), np.zeros(lengths.shape)
-    for i, muscle in enumerate(muscles):
-        par = np.array(muscle.numbers())
-        along = lengths[:, i] - [_tendon_length(par, f) for f in tendon_force[:, i]]
-        fibre = np.hypot(np.maximum(along, 1e-3 * par[1]), par[3])
-        velocity = np.gradient(fibre, times)
-        for k, (x, v, a) in enumerate(zip(fibre, velocity, activations[:, i], strict=True)):
-            active, parallel, *_ = fibre_state(par, x, v, a)
-            cosine, _ = pennation_cosine(par, x)
-            full[k, i], passive[k, i] = active / a * cosine, parallel * cosine
-    return full, passive
-
-
-def _tendon_length(par: np.ndarray, force: float) -> float:
-    """Length of the tendon that carries a force [m]: the inverse of the tendon curve."""
-    f, e_toe, k_lin = force / par[0], par[10], par[11]
-    if f <= 0.0:
-        strain = 0.0
-    elif f <= TOE_FORCE:
-        strain = e_toe / TOE_SHAPE * math.log1p(f * math.expm1(TOE_SHAPE) / TOE_FORCE)
-    else:
-        strain = e_toe + (f - TOE_FORCE) / k_lin
-    return float(par[2] * (1.0 + strain))
-
-
-def _least_squares(moment: np.ndarray, full: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Activations of least squares that give each moment, and what is left over [Nm].
+def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> MotorCommand:
+    """The command for a movement that is given as a table.
 
     Args:
-        moment: wanted of the active forces [Nm], shape (n,).
-        full: moment of each muscle at full activation [Nm], shape (n, 6).
+        model: what the subject knows.
+        times: evenly spaced [s], shape (n,).
+        course: psi [rad], its rate [rad/s] and its acceleration [rad/s^2], shape (n, 3).
     """
-    activations, left = np.zeros(full.shape), np.zeros(len(moment))
-    for k, (wanted, f) in enumerate(zip(moment, full, strict=True)):
-
-        def shares(multiplier: float, f: np.ndarray = f) -> np.ndarray:
-            return np.clip(multiplier * f, MINIMUM, 1.0)
-
-        def surplus(multiplier: float, f: np.ndarray = f, wanted: float = wanted) -> float:
-            return float(f @ shares(multiplier)) - wanted
-
-        # Beyond this multiplier every muscle is at a limit.
-        most = 1.0 / max(float(np.min(np.abs(f))), 1e-6)
-        if surplus(-most) >= 0.0 or surplus(most) <= 0.0:
-            multiplier = -most if surplus(-most) >= 0.0 else most
-        else:
-            multiplier = brentq(surplus, -most, most, xtol=1e-12)
-        activations[k], left[k] = shares(multiplier), surplus(multiplier)
-    return activations, left
+    moment, activations = np.zeros(len(times)), np.zeros((len(times), len(MUSCLES)))
+    shortage = planned(
+        model.arm_table(), model.load_table(), float(times[1] - times[0]), np.ascontiguousarray(course, dtype=float),
+        SWEEPS, RELAXATION, SETTLED, moment, activations,
+    )  # fmt: skip
+    return MotorCommand(times, activations, moment, shortage)

@@ -11,6 +11,7 @@ from dms_core import InputError, Model, ModelError, SolverOptions, System, simul
 from dms_core.errors import AssemblyError
 from dms_core.model import (
     Distance,
+    Fixed,
     Gravity,
     Input,
     JointAngle,
@@ -201,6 +202,23 @@ class TestGeometry:
         far = Distance(name="far", body_j="ball", point_i=(3.0, 0.0, 0.0), length=1.0)
         with pytest.raises(AssemblyError, match=r"constraint '(near|far)\.\w+' stays open by"):
             Model(System(bodies=[ball], constraints=[near, far]))
+
+    @pytest.mark.parametrize("joint", [Fixed, Slider])
+    def test_a_weld_or_slider_turned_over(self, joint):
+        """Its directions are perpendicular there, too."""
+        more = {"axis_i": (1.0, 0.0, 0.0)} if joint is Slider else {}
+        turned = joint(name="joint", body_j="rod", orientation=(0.05, 0.0, 0.0, 1.0), **more)
+        with pytest.raises(AssemblyError, match="'joint' can be assembled only with 'rod' turned over by half a turn"):
+            Model(System(bodies=[rod()], constraints=[turned]))
+
+    def test_a_pointer_along_the_axis(self):
+        """Bodies that know the axis by other names: body_i's pointer (0, 1, 0) is the axis of body_j."""
+        joint = hinge(axis_i=(0.0, 0.0, 1.0), axis_j=(0.0, 1.0, 0.0))
+        upright = rod(orientation=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
+        parts = {"bodies": [upright], "constraints": [joint]}
+        with pytest.raises(ModelError, match=r"joint_angle 's': pointer_j = .* lies along the axis of 'hinge'"):
+            Model(System(**parts, sensors=[JointAngle(name="s", joint="hinge")]))
+        Model(System(**parts, sensors=[JointAngle(name="s", joint="hinge", pointer_j=(1.0, 0.0, 0.0))]))
 
     def test_velocities_that_contradict_a_joint(self):
         system = System(bodies=[rod(velocity=(1.0, 0.0, 0.0))], constraints=[hinge()])

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from dms_core.errors import ModelError
 from dms_core.jit import compiled
 from dms_core.model.frames import perpendicular, unit
 from dms_core.model.rotations import (
@@ -29,6 +30,9 @@ from dms_core.model.rotations import (
     scale,
     sub,
 )
+
+LEAST_LEVER = 1e-3
+"""Sine of the angle between pointer and axis [-] below which a pointer shows no angle."""
 
 
 @compiled
@@ -116,14 +120,14 @@ def add_angle_rate_gradient(k, oi, oj, f, g, h, q, v, factor, W):
         W[k, oj + 3 + i] += 2.0 * factor * (hj[i] + cj[i] - aj[i] * bv - bj[i] * av)
 
 
-def angle_frame(system, who: str, body_i: str, body_j: str, axis_i, pointer_i=None, pointer_j=None) -> np.ndarray:
-    """f, g, h for the kernels above, shape (9,).
+def angle_frame(system, who: str, joint, pointer_i=None, pointer_j=None) -> np.ndarray:
+    """f, g, h for the kernels above, shape (9,), of a revolute joint.
 
-    `axis_i` is the axis in body_i; `pointer_i` a direction in body_i made perpendicular to it (default: any), and
-    `pointer_j` the direction in body_j that lies along it at angle 0. Without `pointer_j` the angle is 0 where the
-    two reference frames are parallel, which is the custom of anatomical joints whose bodies share axes.
+    `pointer_i` is a direction in body_i made perpendicular to the joint's axis (default: any), and `pointer_j` the
+    direction in body_j that lies along it at angle 0. Without `pointer_j` the angle is 0 where the two reference frames
+    are parallel, which is the custom of anatomical joints whose bodies share axes.
     """
-    axis = unit(axis_i, f"{who}: axis_i")
+    axis = unit(joint.axis_i, f"{who}: axis_i")
     f = (
         perpendicular(axis)
         if pointer_i is None
@@ -131,4 +135,10 @@ def angle_frame(system, who: str, body_i: str, body_j: str, axis_i, pointer_i=No
     )
     f = unit(f, f"{who}: pointer_i (its part perpendicular to the axis)")
     h = f if pointer_j is None else unit(pointer_j, f"{who}: pointer_j")
+    axis_j = joint.axis_j if joint.axis_j is not None else system.start_direction(joint.body_i, axis, joint.body_j)
+    if np.linalg.norm(np.cross(unit(axis_j, f"{who}: axis_j"), h)) < LEAST_LEVER:
+        raise ModelError(
+            f"{who}: pointer_j = {tuple(map(float, h))}{'' if pointer_j is not None else ' (that of body_i)'} lies "
+            f"along the axis of '{joint.name}' in '{joint.body_j}' and shows no angle; give one across that axis."
+        )
     return np.concatenate([f, np.cross(axis, f), h])

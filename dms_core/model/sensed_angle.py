@@ -12,5 +12,5 @@ def sensed_angle(
 ) -> tuple[tuple[str, str], tuple[float, ...]]:
     """Bodies of the joint and the nine numbers f, g, h [-] of dms_core.model.joint_angle that define its angle."""
     hinge = system.element(joint, Revolute)
-    frame = angle_frame(system, who, hinge.body_i, hinge.body_j, hinge.axis_i, pointer_i, pointer_j)
+    frame = angle_frame(system, who, hinge, pointer_i, pointer_j)
     return (hinge.body_i, hinge.body_j), tuple(float(x) for x in frame)

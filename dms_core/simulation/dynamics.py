@@ -39,6 +39,7 @@ BUFFER_ROWS = 256
 """Steps recorded between two returns to Python: short enough for a smooth progress bar."""
 
 _RESULTS = {
+    step_control.DONE: Result.SUCCESS,
     step_control.STEP_TOO_SMALL: Result.STEP_TOO_SMALL,
     step_control.NEWTON_FAILED: Result.NEWTON_FAILED,
     step_control.MATRIX_SINGULAR: Result.MATRIX_SINGULAR,
@@ -52,7 +53,7 @@ class SolverOptions:
     """How a run is solved. The defaults keep the elbow angle of arm26 within about 4e-5 rad over a second."""
 
     rtol: float = 1e-5
-    """Relative tolerance of the local error per step [-]."""
+    """Relative tolerance [-]: the local error of a step is kept below a tenth of atol + rtol |y|."""
     atol: float | None = None
     """Absolute tolerance of every variable in its own unit; None takes rtol times each variable's nominal size."""
     fixed_step: float | None = None
@@ -62,9 +63,9 @@ class SolverOptions:
     h_min: float = 1e-12
     """Step below which a run gives up [s]."""
     newton_tol: float = 0.05
-    """Largest error left by Newton's method, in units of the tolerance [-]."""
+    """Largest error left by Newton's method, over the largest local error allowed [-]."""
     constraint_tol: float = 1e-10
-    """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s]."""
+    """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s] (above 1000 / s, 1e-3 c0 times as much)."""
     max_steps: int = 10_000_000
     """Steps after which a run gives up."""
 
@@ -150,7 +151,7 @@ class World:
         except KeyboardInterrupt:
             self.result = Result.INTERRUPTED
             return self.result
-        self.result = _RESULTS.get(code, Result.SUCCESS)
+        self.result = _RESULTS[code]
         return self.result
 
     def _advance(self, t_end: float, progress: Callable[[float], None] | None) -> int:

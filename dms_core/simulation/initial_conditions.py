@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dms_core.assembly.arena import Packed
+from dms_core.assembly.layout import GROUND_COORDINATES
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.errors import AssemblyError
 from dms_core.linear.rank import independent_rows
+from dms_core.model.constraints.fixed import Fixed
+from dms_core.model.constraints.slider import Slider
+from dms_core.model.rotations import rotated
 
 if TYPE_CHECKING:
     from dms_core.assembly.model import Model
@@ -35,7 +39,7 @@ class Start(NamedTuple):
     singular_values: np.ndarray
     """Of phi_q at the start, largest first."""
     moved: float
-    """Largest change of a declared coordinate by assembly."""
+    """Largest change of a declared coordinate by closing the constraints; states that elements set do not count."""
 
 
 def assemble(model: Model, known: Start | None = None) -> Start:
@@ -46,15 +50,18 @@ def assemble(model: Model, known: Start | None = None) -> Start:
         known: start of a model of the same structure, whose independent rows are taken over.
 
     Raises:
-        AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint.
+        AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint;
+            the latter is not looked for where a driver moves at the start.
     """
     q, v = (x[: model.n_q].copy() for x in model.layout.start())
     declared = q.copy()
     q = _closed(model, q, model.layout.system.name)
+    _check_turns(model, q)
+    moved = float(np.max(np.abs(q - declared)))
     active, redundant, singular_values = _rows(model, q) if known is None else known[2:5]
     v = _velocities(model, q, v)
     _start_states(model, q, v)
-    return Start(q, v, active, redundant, singular_values, float(np.max(np.abs(q - declared))))
+    return Start(q, v, active, redundant, singular_values, moved)
 
 
 def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
@@ -81,6 +88,21 @@ def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
             "closed one."
         )
     return q
+
+
+def _check_turns(model: Model, q: np.ndarray) -> None:
+    """Perpendicular directions stay so in a body that is turned over: a weld or slider closed like that is an error."""
+    whole = np.concatenate([q, GROUND_COORDINATES])
+    for call in model.layout.constraints:
+        if not isinstance(call.element, Fixed | Slider):
+            continue
+        local = whole[call.iq]
+        for a, b in zip(*call.element.aligned(call.placement.numbers), strict=True):
+            if np.dot(rotated(local, 0, tuple(a)), rotated(local, 7, tuple(b))) < 0.0:
+                raise AssemblyError(
+                    f"{call.element.kind} '{call.element.name}' can be assembled only with '{call.element.body_j}' "
+                    "turned over by half a turn; declare its start orientation nearer to that of the joint."
+                )
 
 
 def _widest_gap(model: Model, q: np.ndarray) -> tuple[str, float]:
@@ -118,7 +140,10 @@ def _rows(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def _velocities(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Velocities on phi_q v + phi_t = 0: drivers set them; a contradiction of declared ones is an error."""
+    """Velocities on phi_q v + phi_t = 0.
+
+    A contradiction of declared ones is an error; where a driver moves they are a guess, and the nearest are taken.
+    """
     _, phi_v, G, _ = model.constraint_jacobian(q, v)
     _, phi_t, _, _ = model.constraint_jacobian(q, np.zeros_like(v))
     correction = np.linalg.lstsq(G, phi_v, rcond=1e-10)[0] if model.n_phi else np.zeros_like(v)

@@ -103,6 +103,16 @@ def refresh(m, s, c0):
 
 
 @compiled
+def failure(m, s, c0):
+    """Why `refresh` failed: NOT_FINITE where the residual is no number (a smaller step may help), else SINGULAR."""
+    right_hand_side(m, s, c0)
+    b, total = floats(s, STATE.b), 0.0
+    for i in range(b.shape[0]):
+        total += abs(b[i])
+    return SINGULAR if total < math.inf else NOT_FINITE
+
+
+@compiled
 def correction(m, s, c0):
     """Newton correction x at the present iterate, with the matrix at hand; gives its norm."""
     right_hand_side(m, s, c0)
@@ -189,7 +199,7 @@ def newton(m, s, o, c0):
     fresh = count[STALE] == 1 or abs(c0 / clock[C0_FACTORED] - 1.0) > C0_CHANGE
     if fresh:
         if not refresh(m, s, c0):
-            return SINGULAR, 0
+            return failure(m, s, c0), 0
     else:
         run_part(m, s, RESIDUAL)
     contraction, before = clock[CONTRACTION], 0.0
@@ -221,7 +231,7 @@ def newton(m, s, o, c0):
             # Too slow to end in time (Hairer and Wanner 1996, IV.8), as where a kink lies between guess and solution: a
             # fibre that stops shortening needs the matrix of the far side.
             if not refresh(m, s, c0):
-                return SINGULAR, k
+                return failure(m, s, c0), k
         else:
             run_part(m, s, RESIDUAL)
     return (DIVERGED if fresh else STALE_MATRIX), MAX_ITERATIONS

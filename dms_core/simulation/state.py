@@ -64,7 +64,7 @@ class State(NamedTuple):
     q_guess: np.ndarray
     v_guess: np.ndarray
     wq: np.ndarray
-    """Error weights of q: atol + rtol |q|."""
+    """Error weights of q: LOCAL_SHARE (bdf2.py) of atol + rtol |q|."""
     wv: np.ndarray
     newton_values: np.ndarray
     newton_work: np.ndarray
@@ -90,9 +90,6 @@ class Options(NamedTuple):
     newton_tol: float
     constraint_tol: float
     max_steps: int
-
-
-MODEL, STATE = fields(Tables), fields(State)
 
 
 MODEL, STATE = fields(Tables), fields(State)
@@ -127,7 +124,7 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
 
 
 def with_tables(tables: Tables, state: State) -> Packed:
-    """The same world for other rows and elimination orders: it starts afresh with least-norm multipliers unknown."""
+    """The same world for other rows and elimination orders: it starts afresh, with multipliers 0 as their guess."""
     state.counts[RESTART] = state.counts[STALE] = 1
     state.lam[:], state.mu[:] = 0.0, 0.0
     state.w.lam[:], state.w.mu[:] = 0.0, 0.0

@@ -6,11 +6,12 @@ from scipy.optimize import minimize
 
 from dms_core import simulate
 from dms_core.errors import InputError
+from exo_env.command_kernel import least_squares
 from exo_env.ecosystem import Ecosystem, Proprioception
 from exo_env.exoskeleton import Exoskeleton
 from exo_env.gym_machine import GymMachine
 from exo_env.human import MUSCLES, Arm
-from exo_env.motor_command import InternalModel, _least_squares, plan
+from exo_env.motor_command import InternalModel, plan, plan_course
 from exo_env.scenarios import build, load_scenarios
 
 
@@ -24,21 +25,22 @@ def command():
 @pytest.mark.parametrize("wanted", [5.0, 0.3, -4.0])
 def test_least_squares_against_a_general_optimiser(wanted):
     full = np.array([-16.0, -12.0, -11.0, 22.0, 14.0, 16.0])
-    found, left = _least_squares(np.array([wanted]), full[None, :])
+    found = np.zeros(6)
+    left = least_squares(wanted, full, found)
     other = minimize(
         lambda a: a @ a, np.full(6, 0.2), jac=lambda a: 2 * a, bounds=[(0.01, 1.0)] * 6, method="SLSQP",
         constraints={"type": "eq", "fun": lambda a: full @ a - wanted, "jac": lambda a: full}, options={"ftol": 1e-14},
     )  # fmt: skip
-    assert other.success and left[0] == pytest.approx(0.0, abs=1e-9)
+    assert other.success and left == pytest.approx(0.0, abs=1e-9)
     # SLSQP stops within about the square root of its ftol.
-    np.testing.assert_allclose(found[0], other.x, atol=1e-6)
+    np.testing.assert_allclose(found, other.x, atol=1e-6)
 
 
 def test_a_moment_out_of_reach_is_reported():
-    full = np.array([[-16.0, -12.0, -11.0, 22.0, 14.0, 16.0]])
-    found, left = _least_squares(np.array([100.0]), full)
-    np.testing.assert_allclose(found[0], [0.01] * 3 + [1.0] * 3)
-    assert left[0] == pytest.approx(52.0 - 0.01 * 39.0 - 100.0)
+    found = np.zeros(6)
+    left = least_squares(100.0, np.array([-16.0, -12.0, -11.0, 22.0, 14.0, 16.0]), found)
+    np.testing.assert_allclose(found, [0.01] * 3 + [1.0] * 3)
+    assert left == pytest.approx(52.0 - 0.01 * 39.0 - 100.0)
 
 
 @pytest.mark.parametrize("time", [0.2, 2.75, 5.3])
@@ -68,8 +70,20 @@ def test_wanted_moment_at_rest_is_weight_times_lever(command):
     to_pulley = np.array(machine.low_pulley) - arm.elbow - grip
     pull = 9.8066 * to_pulley / np.linalg.norm(to_pulley) + machine.handle.mass * np.array(arm.gravity)
     outside = arm.axis @ np.cross(grip, pull) + arm.gravity_moment(psi)
-    # Differences of 1e-4 rad in the internal model.
-    assert command.moment[k] == pytest.approx(-outside, abs=1e-6)
+    # Both exact; the reference has come to rest to rounding.
+    assert command.moment[k] == pytest.approx(-outside, abs=1e-9)
+
+
+def test_a_coarse_table_of_times_gives_the_same_command(command):
+    """The environment plans every 50 ms, which keeps a reset short."""
+    exercise, _ = load_scenarios()
+    machine = GymMachine.from_config("gym_machine/pulley.yaml")
+    times = np.linspace(0.0, exercise.duration, 111)
+    coarse = plan_course(InternalModel(Arm(), machine, 1.0), times, np.array([exercise.course(t) for t in times]))
+    for k in range(6):
+        # Linear between points 50 ms apart, along a movement whose fastest part lasts a second; 0.0018 was measured.
+        drawn = np.interp(command.times, times, coarse.activations[:, k])
+        np.testing.assert_allclose(drawn, command.activations[:, k], atol=4e-3)
 
 
 def test_a_subject_that_is_right_about_everything_follows():

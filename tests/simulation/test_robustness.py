@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
+from numba import njit
 
 from dms_core.assembly.model import Model
 from dms_core.model import Constant, Function, Input, LineGuide, PathPoint, PointMass, SecondOrder, System, ThelenMuscle
+from dms_core.model.element import Force, Placement
 from dms_core.simulation.dynamics import SolverOptions, simulate
 from tests.assembly.specimen import BODIES, CONSTRAINTS, FORCES, INPUTS
 
@@ -71,3 +75,29 @@ def test_a_function_of_time_is_an_input():
     )
     run = simulate(system, 1.0, SolverOptions(rtol=1e-8)).check()
     np.testing.assert_allclose(run.own_steps().coordinate("x.x"), run.t**4 / 4.0, atol=5e-6)
+
+
+@njit
+def _wall(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
+    x = q[0] if q[0] > 0.0 else np.nan
+    r[0] -= 1e-7 / x**2
+    if level > 0:
+        Jq[0, 0] += 2e-7 / x**3
+
+
+class _Wall(Force):
+    """Repels the mass from x = 0, behind which it is no number."""
+
+    kind: ClassVar[str] = "wall"
+    kernel: ClassVar = _wall
+
+    def place(self, system):
+        return Placement(bodies=("mass",))
+
+
+def test_a_guess_where_a_force_is_no_number_is_a_step_too_long():
+    """Thrown at the wall with 1 m/s the mass turns at 0.2 um; not a singular matrix, but shorter steps."""
+    mass = PointMass(name="mass", mass=1.0, position=(1.0, 0.0, 0.0), velocity=(-1.0, 0.0, 0.0))
+    run = simulate(System("thrown", bodies=[mass], forces=[_Wall(name="wall")]), 2.0, SolverOptions(rtol=1e-4)).check()
+    assert run.stats.rejected_newton > 0
+    assert run.q[:, 0].min() > 0.0

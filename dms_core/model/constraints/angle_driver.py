@@ -60,7 +60,7 @@ class AngleDriver(Constraint):
         """Both bodies of the joint, the angle's frame, the input."""
         joint = system.element(self.joint, Revolute)
         who = f"angle_driver '{self.name}'"
-        frame = angle_frame(system, who, joint.body_i, joint.body_j, joint.axis_i, self.pointer_i, self.pointer_j)
+        frame = angle_frame(system, who, joint, self.pointer_i, self.pointer_j)
         return Placement(
             bodies=(joint.body_i, joint.body_j), inputs=(self.input,), numbers=tuple(frame), pattern=joint_pattern("1")
         )

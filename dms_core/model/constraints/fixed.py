@@ -45,6 +45,10 @@ class Fixed(Constraint):
         """Coincidence in ground axes, then rotations about the axes z, x, y of body_i."""
         return ("x", "y", "z", "turn_z", "turn_x", "turn_y")
 
+    def aligned(self, numbers) -> tuple[np.ndarray, np.ndarray]:
+        """Axes of body_i and the directions of body_j that coincide with them, as rows, shapes (3, 3)."""
+        return np.eye(3), np.reshape(numbers[6:15], (3, 3))
+
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
         R = relative_rotation(system, f"fixed '{self.name}'", self.body_i, self.body_j, self.orientation)

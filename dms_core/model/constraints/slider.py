@@ -56,6 +56,10 @@ class Slider(Constraint):
         """Distances from the axis along f and g, then rotations about a, f, g."""
         return ("off_f", "off_g", "turn_a", "turn_f", "turn_g")
 
+    def aligned(self, numbers) -> tuple[np.ndarray, np.ndarray]:
+        """Directions f, g, a of body_i and f', g', a' of body_j that coincide with them, as rows, shapes (3, 3)."""
+        return np.reshape(numbers[6:15], (3, 3)), np.reshape(numbers[15:24], (3, 3))
+
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
         who = f"slider '{self.name}'"

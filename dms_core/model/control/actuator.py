@@ -121,7 +121,7 @@ class RopeActuator(Force):
         return self
 
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """The tension, a first-order state; sizes are a newton and a newton in T."""
+        """The tension, a first-order state; its nominal size is NOMINAL_TENSION, and that in T."""
         start = self.pretension if self.start_tension is None else self.start_tension
         rate_scale = NOMINAL_TENSION / self.time_constant
         return (Coordinate("tension", start, scale=NOMINAL_TENSION, rate_scale=rate_scale, differential_rate=False),)

@@ -91,7 +91,7 @@ class JointSpringDamper(Force):
         """Both bodies of the joint and the angle's frame."""
         joint = system.element(self.joint, Revolute)
         who = f"joint_spring_damper '{self.name}'"
-        frame = angle_frame(system, who, joint.body_i, joint.body_j, joint.axis_i, self.pointer_i, self.pointer_j)
+        frame = angle_frame(system, who, joint, self.pointer_i, self.pointer_j)
         p = np.arange(14) % 7 >= 3
         full, none = np.outer(p, p), np.zeros((14, 14), bool)
         return Placement(

@@ -28,7 +28,8 @@ class JointReaction(Sensor):
     constraint: str = Field(description="constraint whose reaction is measured")
     body: str = Field(description="body of that constraint on which the reaction acts")
     point: Vector | None = Field(
-        default=None, description="point in the frame of that body [m]; the joint's own point when not given"
+        default=None,
+        description="point in the frame of that body [m]; default: the joint's own point, or the centre of mass",
     )
     frame: str = Field(default=GROUND, description="'ground' or a body of the constraint, whose axes are used")
 
