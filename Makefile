@@ -28,7 +28,7 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: $(STAMP)
 	$(BIN)/python -m exo_env scenarios --out $(OUT)
-	@echo "Figures, tables and scenarios.json are in $(CURDIR)/$(OUT)"
+	@echo "Figures, tables and scenarios.json are in $(abspath $(OUT))"
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS)

@@ -8,27 +8,19 @@ python -m dms_core schema [--out FILE]
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import tyro
-from tqdm import tqdm
 from tyro.conf import Positional, arg
 
 from dms_core import Model, Simulation, SolverOptions, Trajectory
+from dms_core.command_line import FAILED_RUN, bar_of_run, moves, run_command
 from dms_core.errors import DmsError, InputError
 from dms_core.model_file import load
 from dms_core.output_file import check_writable, whole_file, with_unit, write_csv, write_json
 from dms_core.results import States
 from dms_core.schema import reference
-
-LONG_RUN = 2.0
-"""Seconds after which a run shows a progress bar."""
-
-USER_MISTAKE, FAILED_RUN = 2, 1
-"""Exit statuses."""
 
 
 def check(model: Positional[Path]) -> int:
@@ -77,6 +69,7 @@ def run(
     t_end: float,
     out: Path,
     rtol: float = SolverOptions.rtol,
+    atol: float | None = None,
     sample: float | None = None,
     stats: Path | None = None,
     step: float | None = None,
@@ -90,22 +83,26 @@ def run(
         model: model file (YAML).
         t_end: end time [s].
         out: CSV file to write; its folder is made where it is missing.
-        rtol: relative tolerance of the error per step.
-        sample: time between rows [s]; default: the solver's own steps.
+        rtol: relative tolerance of the error.
+        atol: absolute tolerance of every variable in its own unit; default: rtol times the variable's nominal size.
+        sample: time between rows [s], the last row at the end time; default: the solver's own steps.
         stats: JSON file for the solver's statistics.
-        step: constant step [s] instead of error control.
+        step: constant step [s] instead of error control; rtol then only sets how far Newton's method goes.
     """
     if not (np.isfinite(t_end) and t_end > 0.0):
         raise InputError(f"--t-end {t_end}: a positive time [s] is wanted.")
     if sample is not None and not (np.isfinite(sample) and sample > 0.0):
         raise InputError(f"--sample {sample}: a positive time [s] is wanted.")
-    options = SolverOptions(rtol=rtol, fixed_step=step)
+    for name, value in (("--rtol", rtol), ("--atol", atol), ("--step", step)):
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise InputError(f"{name} {value}: a positive number is wanted.")
+    options = SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
     for path in (out, stats):
         if path is not None:
             check_writable(path)
     simulation = Simulation(compiled(model), options)
-    with tqdm(total=t_end, unit="s", delay=LONG_RUN, leave=False, disable=None, bar_format=BAR) as bar:
-        simulation.advance(t_end, _moves(bar))
+    with bar_of_run(t_end) as bar:
+        simulation.advance(t_end, moves(bar))
     trajectory = simulation.trajectory()
     write_csv(out, table(trajectory, sample))
     summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
@@ -122,18 +119,6 @@ def run(
     return 0
 
 
-BAR = "{percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
-
-
-def _moves(bar: tqdm) -> Callable[[float], None]:
-    """Progress callback that moves the bar to the time reached."""
-
-    def progress(t: float) -> None:
-        bar.update(t - bar.n)
-
-    return progress
-
-
 def table(trajectory: Trajectory, sample: float | None) -> dict[str, np.ndarray]:
     """Columns of a run: time, sensors with their unit, coordinates 'q.*' and their rates 'v.*'.
 
@@ -143,9 +128,7 @@ def table(trajectory: Trajectory, sample: float | None) -> dict[str, np.ndarray]
     """
     states = trajectory.own_steps()
     if sample is not None and len(trajectory.t) > 1:
-        # A multiple of `sample` that rounding puts just behind the end still counts.
-        count = int(np.floor(trajectory.t[-1] / sample * (1.0 + 1e-12)))
-        states = trajectory.at(np.minimum(np.arange(count + 1) * sample, trajectory.t[-1]))
+        states = trajectory.at(trajectory.grid(sample))
     return columns(states)
 
 
@@ -170,16 +153,12 @@ def schema(out: Annotated[Path | None, arg(help="file to write; default: standar
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
-    try:
-        return tyro.extras.subcommand_cli_from_dict(
-            {"check": check, "run": run, "schema": schema},
-            prog="python -m dms_core",
-            description="Check, run and describe models of multibody systems with ropes, muscles and controllers.",
-            args=arguments,
-        )
-    except DmsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return USER_MISTAKE
+    return run_command(
+        {"check": check, "run": run, "schema": schema},
+        "python -m dms_core",
+        "Check, run and describe models of multibody systems with ropes, muscles and controllers.",
+        arguments,
+    )
 
 
 if __name__ == "__main__":

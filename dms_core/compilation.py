@@ -53,7 +53,7 @@ class _Announcer(event.Listener):
         if not self.silent and not isinstance(event.data["dispatcher"]._cache, NullCache):
             self.silent = True
             print(
-                "dms_core: compiling to machine code, kept on disk (the very first run takes about half a minute) ...",
+                "dms_core: compiling what is new, kept on disk (seconds; about a minute the very first time) ...",
                 file=sys.stderr,
                 flush=True,
             )

@@ -17,7 +17,8 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
     """Decorator: compile on first use, once for each combination of types, and keep the machine code on disk."""
     if function is None:
         return lambda f: compiled(f, **options)
-    dispatcher = njit(cache=True, error_model="numpy", **options)(function)
+    habits: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    dispatcher = njit(**habits, **options)(function)
     by_types = dispatcher.get_call_template
 
     def get_call_template(args: tuple, kws: dict) -> Any:

@@ -21,7 +21,7 @@ class Result(Enum):
 
     SUCCESS = "The run reached its end time."
     STEP_TOO_SMALL = "The error test asked for a step below the smallest allowed one; loosen rtol or look for a discontinuity that no input table declares."  # noqa: E501
-    NEWTON_FAILED = "Newton's method did not converge at the smallest allowed step; look for a force without a derivative, or take a smaller fixed step."  # noqa: E501
+    NEWTON_FAILED = "Newton's method did not converge: take a smaller fixed step, or, under error control, look for a force whose derivatives are wrong."  # noqa: E501
     MATRIX_SINGULAR = "The Newton matrix is singular: the mechanism is in a singular position or a body has no inertia along a free direction."  # noqa: E501
     TOO_MANY_STEPS = "The largest number of steps was used up before the end time; raise max_steps or loosen rtol."
     RATES_FAILED = (
@@ -132,6 +132,13 @@ class Trajectory:
         mu = (1.0 - x) * self.mu[start] + x * self.mu[end]
         v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
         return States(self.model, self.signals, times, q, v, a, lam, mu)
+
+    def grid(self, sample: float) -> np.ndarray:
+        """Times 0, sample, 2 sample, ... of the run, and its end [s]."""
+        end = self.t[-1]
+        # A multiple of `sample` that rounding puts just behind the end still counts.
+        times = np.minimum(np.arange(int(np.floor(end / sample * (1.0 + 1e-12))) + 1) * sample, end)
+        return times if end - times[-1] < 1e-9 * sample else np.append(times, end)
 
     def own_steps(self) -> States:
         """States on the solver's own steps."""

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
-import tyro
 from tqdm import tqdm
 
 from dms_core import Simulation, SolverOptions
-from dms_core.errors import DmsError, InputError
+from dms_core.command_line import FAILED_RUN, bar_of_run, moves, run_command
+from dms_core.errors import InputError
 from dms_core.model.control.ziegler_nichols import STEP, Gains, ziegler_nichols
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.output_file import check_writable, write_csv, write_json
@@ -30,8 +29,6 @@ from exo_env.tune import START, StepExperiment, proportional
 from exo_env.tune import tune as find_gains
 
 DEVICE = "exoskeletons/elbow.yaml"
-USER_MISTAKE, FAILED_RUN = 2, 1
-"""Exit statuses."""
 BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
 
 
@@ -49,7 +46,7 @@ def scenarios(out: Path, rtol: float = SolverOptions.rtol) -> int:
     with tqdm(total=exercise.duration * len(FILES), unit="s", leave=False, disable=None, bar_format=BAR) as bar:
         for name, scenario in zip(FILES, all_scenarios, strict=True):
             bar.set_description(name)
-            runs.append(run(scenario, exercise, options=options, progress=_moves(bar, len(runs) * exercise.duration)))
+            runs.append(run(scenario, exercise, options=options, progress=moves(bar, len(runs) * exercise.duration)))
     summaries = [summary(r) for r in runs]
     orderings = judged(summaries)
     for name, r in zip(FILES, runs, strict=True):
@@ -60,15 +57,6 @@ def scenarios(out: Path, rtol: float = SolverOptions.rtol) -> int:
     print(_report(named, orderings))
     print(f"written: {out}")
     return 0
-
-
-def _moves(bar: tqdm, before: float) -> Callable[[float], None]:
-    """Progress callback that moves the bar to the time reached in all runs."""
-
-    def progress(t: float) -> None:
-        bar.update(before + t - bar.n)
-
-    return progress
 
 
 def _draw_scenarios(out: Path, runs: list[ScenarioRun]) -> None:
@@ -168,7 +156,8 @@ def arm26(
     """Drive the bare arm26 by a table of excitations and write its motion, muscles and elbow reaction as CSV.
 
     Args:
-        excitations: CSV file with 'time_s' and one column a muscle [-]; each row holds until the next.
+        excitations: CSV file with the columns time_s [s], BIClong, BICshort, BRA, TRIlong, TRIlat, TRImed [-, 0 to 1];
+            each row holds until the next, and the first stands at 0.
         out: CSV file to write; its folder is made where it is missing.
         t_end: end time [s].
         start_deg: elbow flexion at the start [deg].
@@ -186,11 +175,13 @@ def arm26(
     check_writable(out)
     system = bare.bare_arm(math.radians(start_deg), bare.read_excitations(excitations), start_activation)
     simulation = Simulation(system, SolverOptions(rtol=rtol))
-    with tqdm(total=t_end, unit="s", delay=2.0, leave=False, disable=None, bar_format=BAR) as bar:
-        simulation.advance(t_end, _moves(bar, 0.0))
+    with bar_of_run(t_end) as bar:
+        simulation.advance(t_end, moves(bar))
     trajectory = simulation.trajectory()
     write_csv(out, bare.table(trajectory, sample))
     print(f"{trajectory.message} {trajectory.stats.steps} steps. Written: {out}")
+    for warning in bare.warnings(trajectory):
+        print(f"warning: {warning}", file=sys.stderr)
     if not trajectory.success:
         print(f"The run failed; '{out}' holds the part before.", file=sys.stderr)
         return FAILED_RUN
@@ -199,16 +190,12 @@ def arm26(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
-    try:
-        return tyro.extras.subcommand_cli_from_dict(
-            {"scenarios": scenarios, "tune": tune, "arm26": arm26},
-            prog="python -m exo_env",
-            description="A subject with an elbow exoskeleton on a gym machine: scenarios, tuning, and the bare arm.",
-            args=arguments,
-        )
-    except DmsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return USER_MISTAKE
+    return run_command(
+        {"scenarios": scenarios, "tune": tune, "arm26": arm26},
+        "python -m exo_env",
+        "A subject with an elbow exoskeleton on a gym machine: scenarios, tuning, and the bare arm.",
+        arguments,
+    )
 
 
 if __name__ == "__main__":

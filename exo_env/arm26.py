@@ -31,6 +31,10 @@ COMPONENTS: dict[Component, str] = {
 REACTION = {**{f"F{axis}": f"F{axis}_N" for axis in "xyz"}, **{f"M{axis}": f"M{axis}_Nm" for axis in "xyz"}}
 
 
+HIGHEST_FLEXION_DEG = 130.0
+"""End of arm26's range of elbow flexion [deg], see configs/subject/arm26.yaml."""
+
+
 def bare_arm(
     start: float, excitations: Mapping[str, AnySignal], start_activation: float, arm: Arm | None = None
 ) -> System:
@@ -75,7 +79,7 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
     """
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
@@ -97,12 +101,16 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
             f"excitations '{path}': {TIME} must increase from row to row, "
             f"but {times[k]:g} is followed by {times[k + 1]:g}."
         )
+    if times[0] > 0.0:
+        raise InputError(f"excitations '{path}': the first row is at {TIME} = {times[0]:g}; give one at 0 or before.")
     return {m: Steps(times=tuple(times), values=tuple(table[m])) for m in MUSCLES}
 
 
 def _check_header(path: Path, header: list[str]) -> None:
     """Exactly the wanted columns, in any order."""
     wanted = {TIME, *MUSCLES}
+    if len(header) == 1 and ";" in header[0]:
+        raise InputError(f"excitations '{path}': the columns are separated by semicolons; separate them by commas.")
     for name in header:
         if name not in wanted:
             raise InputError(f"excitations '{path}': unknown column '{name}'. Wanted: {choices(wanted)}.")
@@ -136,16 +144,27 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
 
 
 def table(trajectory: Trajectory, sample: float) -> dict[str, np.ndarray]:
-    """Columns of a run, every `sample` seconds."""
-    end = trajectory.t[-1]
-    # A multiple of `sample` that rounding puts just behind the end still counts.
-    times = np.minimum(np.arange(int(end / sample * (1.0 + 1e-12)) + 1) * sample, end)
+    """Columns of a run, every `sample` seconds and at its end."""
+    times = trajectory.grid(sample)
     y = trajectory.sensors(times)
     columns = {
         TIME: times,
-        "elbow_flexion_rad": y["elbow_angle.angle"],
+        # The sensor's angle is within half a turn; nothing stops the model's elbow from going further.
+        "elbow_flexion_rad": np.unwrap(y["elbow_angle.angle"]),
         "elbow_speed_rad_per_s": y["elbow_angle.rate"],
         "elbow_acceleration_rad_per_s2": y["elbow_angle.acceleration"],
     }
     columns |= {f"{m}_{end}": y[f"{m}.sensor.{c}"] for c, end in COMPONENTS.items() for m in MUSCLES}
     return columns | {f"elbow_reaction_on_forearm_{end}": y[f"elbow_reaction.{c}"] for c, end in REACTION.items()}
+
+
+def warnings(trajectory: Trajectory) -> list[str]:
+    """What a reader of the run should know: an elbow outside the range of arm26, which has no joint stops."""
+    degrees = np.degrees(np.unwrap(trajectory.sensors()["elbow_angle.angle"]))
+    low, high = degrees.min(), degrees.max()
+    if low >= 0.0 and high <= HIGHEST_FLEXION_DEG:
+        return []
+    return [
+        f"the elbow moved from {low:.1f} to {high:.1f} deg of flexion; arm26 is meant for 0 to "
+        f"{HIGHEST_FLEXION_DEG:.0f} deg, and nothing stops the joint there."
+    ]

@@ -37,7 +37,7 @@ def said(tmp_path):
 
 
 def test_said_once_when_code_is_missing_and_never_when_it_is_there(said):
-    assert said(cache=True).count("compiling to machine code") == 1
+    assert said(cache=True).count("compiling what is new") == 1
     assert said(cache=True) == ""
 
 

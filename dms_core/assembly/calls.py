@@ -15,6 +15,7 @@ from numba.extending import intrinsic
 from dms_core.errors import ModelError
 from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
 
+PART = types.void(types.Array(types.int64, 2, "C"), types.Array(types.int64, 2, "C"))
 SIGNAL = types.void(types.float64, types.Array(types.float64, 1, "C"))
 
 
@@ -61,3 +62,9 @@ def call_sensor(typingctx, address, ip, par, q, v, a, lam, u, level, y, Yq, Yv, 
 def call_signal(typingctx, address, t, out):
     """Call a compiled function of time."""
     return _call_by_address(SIGNAL)
+
+
+@intrinsic
+def call_part(typingctx, address, m, s):
+    """Call a part of a step."""
+    return _call_by_address(PART)

@@ -29,6 +29,7 @@ from dms_core.linear.rank import independent_rows, minimum_norms
 from dms_core.linear.symbolic import LuTables, plan
 from dms_core.model.system import System
 from dms_core.simulation.initial_conditions import Start, assemble
+from dms_core.simulation.parts import part_addresses
 from dms_core.simulation.state import STATE, Tables, new_state
 
 TYPICAL_C0 = 1.5e3
@@ -204,7 +205,9 @@ class Model:
         scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
         calls = (self._dynamics.values, self._constraints.values, self._sensors.values)
         scale_q, scale_v = np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1])
-        return Tables(*calls, newton, newton_lu, rates, rate_lu, active, self.second_order, scale_q, scale_v)
+        return Tables(
+            *calls, newton, newton_lu, rates, rate_lu, active, self.second_order, scale_q, scale_v, part_addresses()
+        )
 
     def _with_orders_of(self, like: Model) -> Tables:
         """Tables with this model's numbers and the other's scatter and elimination orders."""

@@ -13,9 +13,10 @@ have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 
 import math
 
 from dms_core.assembly.arena import flags, floats, inner, ints
-from dms_core.assembly.residual import WORK, evaluate_inputs
+from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.newton import CONVERGED, DIVERGED, STALE_MATRIX, newton
+from dms_core.simulation.parts import set_inputs
 from dms_core.simulation.state import AGE, H_BEFORE, H_BEFORE2, MODEL, STALE, STATE, T
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
@@ -55,7 +56,7 @@ def put_guess(m, s, c0, lam_slope):
 def solve_stage(m, s, o, t, c0, lam_slope):
     """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once."""
     count = ints(s, STATE.counts)
-    evaluate_inputs(inner(s, STATE.signals), t, True, inner(s, STATE.w))
+    set_inputs(m, s, t, True)
     count[AGE] += 1
     if count[AGE] > MAX_AGE:
         count[STALE] = 1

@@ -9,10 +9,10 @@ force-velocity curve makes it a Newton iteration, halved whenever the residual g
 import math
 
 from dms_core.assembly.arena import flags, floats, indices, inner, ints
-from dms_core.assembly.residual import WORK, evaluate_rates
+from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.linear_solve import back_substitute, factorise
-from dms_core.simulation.state import FACTORISATIONS, MODEL, STALE, STATE
+from dms_core.simulation.parts import RATE_MATRIX, RATE_SOLUTION, run_part
+from dms_core.simulation.state import FACTORISATIONS, MODEL, PIVOT, STALE, STATE
 
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-11
@@ -45,11 +45,8 @@ def _change(m, s, share):
 @compiled
 def _correct(m, s):
     """Newton correction at the present unknowns; False if the matrix is singular."""
-    w, active = inner(s, STATE.w), indices(m, MODEL.active)
-    b, x, values, work = (
-        floats(s, STATE.rate_b), floats(s, STATE.rate_x), floats(s, STATE.rate_values), floats(s, STATE.rate_work),
-    )  # fmt: skip
-    evaluate_rates(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.rates), w, values)
+    w, active, b = inner(s, STATE.w), indices(m, MODEL.active), floats(s, STATE.rate_b)
+    run_part(m, s, RATE_MATRIX)
     r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
     n = b.shape[0] - active.shape[0]
     for i in range(n):
@@ -57,9 +54,9 @@ def _correct(m, s):
     for k in range(active.shape[0]):
         b[n + k] = -phi_a[active[k]]
     ints(s, STATE.counts)[FACTORISATIONS] += 1
-    if not factorise(m, MODEL.rate_lu, values, work) > 0.0:
+    if not floats(s, STATE.clock)[PIVOT] > 0.0:
         return False
-    back_substitute(m, MODEL.rate_lu, values, b, x, work)
+    run_part(m, s, RATE_SOLUTION)
     return True
 
 

@@ -8,9 +8,9 @@ iteration contracts; corrections of a step that does not reduce the simplified N
 import math
 
 from dms_core.assembly.arena import floats, indices, inner, ints
-from dms_core.assembly.residual import WORK, evaluate_constraints, evaluate_newton, evaluate_residual
+from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, run_part
 from dms_core.simulation.state import (
     AGE,
     C0_FACTORED,
@@ -21,6 +21,7 @@ from dms_core.simulation.state import (
     MU,
     PHI,
     PHI_V,
+    PIVOT,
     STALE,
     STATE,
 )
@@ -92,15 +93,13 @@ def correction_norm(s, c0):
 @compiled
 def refresh(m, s, c0):
     """Evaluate residual and matrix here and factorise; False if the matrix is singular."""
-    values, count = floats(s, STATE.newton_values), ints(s, STATE.counts)
-    evaluate_newton(
-        inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.newton), inner(s, STATE.w), c0, values
-    )
+    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
+    clock[C0_FACTORED] = c0
     count[FACTORISATIONS] += 1
     count[STALE] = 0
     count[AGE] = 0
-    floats(s, STATE.clock)[C0_FACTORED] = c0
-    return factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work)) > SINGULAR_PIVOT
+    run_part(m, s, NEWTON_MATRIX)
+    return clock[PIVOT] > SINGULAR_PIVOT
 
 
 @compiled
@@ -117,14 +116,7 @@ def failure(m, s, c0):
 def correction(m, s, c0):
     """Newton correction x at the present iterate, with the matrix at hand; gives its norm."""
     right_hand_side(m, s, c0)
-    back_substitute(
-        m,
-        MODEL.newton_lu,
-        floats(s, STATE.newton_values),
-        floats(s, STATE.b),
-        floats(s, STATE.x),
-        floats(s, STATE.newton_work),
-    )
+    run_part(m, s, NEWTON_SOLUTION)
     ints(s, STATE.counts)[ITERATIONS] += 1
     return correction_norm(s, c0)
 
@@ -159,7 +151,7 @@ def line_search(m, s, c0, before):
     for _ in range(MAX_HALVINGS):
         share *= 0.5
         apply(m, s, c0, floats(s, STATE.x_before), -share)
-        evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w))
+        run_part(m, s, RESIDUAL)
         norm = correction(m, s, c0)
         if norm < before:
             return norm
@@ -178,7 +170,7 @@ def close_constraints(m, s, o, c0):
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
     n, k = floats(s, STATE.q).shape[0], active.shape[0]
     for _ in range(MAX_CLOSINGS):
-        evaluate_constraints(inner(m, MODEL.constraints), w)
+        run_part(m, s, CONSTRAINTS)
         error, error_v = largest_errors(s)
         if error <= o.constraint_tol and error_v <= o.constraint_tol * max(1.0, 1e-3 * c0):
             return True
@@ -186,7 +178,7 @@ def close_constraints(m, s, o, c0):
         for i in range(k):
             b[2 * n + i] = -phi[active[i]]
             b[2 * n + k + i] = -phi_v[active[i]] / c0
-        back_substitute(m, MODEL.newton_lu, floats(s, STATE.newton_values), b, x, floats(s, STATE.newton_work))
+        run_part(m, s, NEWTON_SOLUTION)
         apply(m, s, c0, x, 1.0)
     return False
 
@@ -203,14 +195,13 @@ def newton(m, s, o, c0):
         floats(s, STATE.x),
         floats(s, STATE.x_before),
     )
-    dynamics, constraints, w = inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w)
     set_rates(s, c0)
     fresh = count[STALE] == 1 or abs(c0 / clock[C0_FACTORED] - 1.0) > C0_CHANGE
     if fresh:
         if not refresh(m, s, c0):
             return failure(m, s, c0), 0
     else:
-        evaluate_residual(dynamics, constraints, w)
+        run_part(m, s, RESIDUAL)
     contraction, before = clock[CONTRACTION], 0.0
     for k in range(MAX_ITERATIONS):
         norm = correction(m, s, c0)
@@ -242,5 +233,5 @@ def newton(m, s, o, c0):
             if not refresh(m, s, c0):
                 return failure(m, s, c0), k
         else:
-            evaluate_residual(dynamics, constraints, w)
+            run_part(m, s, RESIDUAL)
     return (DIVERGED if fresh else STALE_MATRIX), MAX_ITERATIONS

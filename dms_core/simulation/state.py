@@ -12,10 +12,10 @@ from dms_core.assembly.tables import Calls, Signals, Work
 from dms_core.linear.lu import LuTables, storage
 
 # Entries of State.clock [s, unless said].
-T, H, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION = range(7)
+T, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION, PIVOT, T_INPUTS = range(8)
 # Entries of State.counts.
 (STEPS, REJECTED_ERROR, REJECTED_NEWTON, ITERATIONS, FACTORISATIONS, RESTARTS,
- RESTART, STALE, AGE, WORST_ROW) = range(10)  # fmt: skip
+ RESTART, STALE, AGE, BEFORE_JUMP) = range(10)  # fmt: skip
 # Entries of State.largest.
 PHI, PHI_V, MU, H_LEAST, H_MOST = range(5)
 
@@ -36,6 +36,8 @@ class Tables(NamedTuple):
     """True for second-order coordinates, whose vdot appears in their row, (n_q,)."""
     scale_q: np.ndarray
     scale_v: np.ndarray
+    parts: np.ndarray
+    """Addresses of the parts of a step, see parts.py."""
 
 
 class State(NamedTuple):
@@ -115,7 +117,7 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
     counts = zeros(10, np.int64)
     counts[RESTART] = counts[STALE] = 1
     return Packed(State(
-        w, signals, zeros(7), counts, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
+        w, signals, zeros(8), counts, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
         q.copy(), v.copy(), v.copy(), zeros(n), zeros(m), zeros(m), q.copy(), v.copy(), zeros(m),
         *(zeros(n) for _ in range(6)), **_linear_arrays(tables),
     ))  # fmt: skip

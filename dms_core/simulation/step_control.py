@@ -8,11 +8,12 @@ keeps the factorised matrix good.
 import math
 
 from dms_core.assembly.arena import floats, inner, ints
-from dms_core.assembly.residual import SIGNALS, WORK, evaluate_inputs
+from dms_core.assembly.residual import SIGNALS, WORK
 from dms_core.jit import compiled
 from dms_core.simulation.bdf2 import GAMMA, bdf2_step, set_weights, start_step
 from dms_core.simulation.initial_rates import consistent_rates
 from dms_core.simulation.newton import CONVERGED, MAX_ITERATIONS, SINGULAR, note_errors
+from dms_core.simulation.parts import set_inputs
 from dms_core.simulation.state import (
     H_BEFORE,
     H_BEFORE2,
@@ -103,7 +104,7 @@ def accept(s, h, c0, started):
 def restart(m, s, o):
     """Values just behind a jump: inputs from the right, consistent rates and multipliers; False if there are none."""
     clock = floats(s, STATE.clock)
-    evaluate_inputs(inner(s, STATE.signals), clock[T], False, inner(s, STATE.w))
+    set_inputs(m, s, clock[T], False)
     ints(s, STATE.counts)[RESTARTS] += 1
     if not consistent_rates(m, s):
         return False

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from tqdm import tqdm
 
-from dms_core.__main__ import BAR, FAILED_RUN, USER_MISTAKE, _moves
+from dms_core.command_line import BAR, FAILED_RUN, USER_MISTAKE, moves
 from dms_core.config_files import config_file, configs
 from dms_core.output_file import whole_file, with_unit, write_csv
 from dms_core.schema import reference
@@ -212,7 +212,7 @@ def test_help(command, name):
 def test_the_progress_bar_shows_simulated_time():
     shown = io.StringIO()
     with tqdm(total=4.0, file=shown, bar_format=BAR, mininterval=0.0, miniters=0) as bar:
-        progress = _moves(bar)
+        progress = moves(bar)
         progress(1.0)
         progress(3.0)
         assert math.isclose(bar.n, 3.0)

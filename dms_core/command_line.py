@@ -1,0 +1,50 @@
+"""What the command lines of both packages share: exit statuses, the progress bar, errors as one message."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import tyro
+from tqdm import tqdm
+
+from dms_core.errors import DmsError
+
+USER_MISTAKE, FAILED_RUN = 2, 1
+"""Exit statuses."""
+LONG_RUN = 2.0
+"""Seconds after which a run shows a progress bar."""
+BAR = "{percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
+
+
+def bar_of_run(seconds: float) -> tqdm:
+    """A bar over simulated time that appears on long runs only."""
+    return tqdm(total=seconds, unit="s", delay=LONG_RUN, leave=False, disable=None, bar_format=BAR)
+
+
+def moves(bar: tqdm, before: float = 0.0) -> Callable[[float], None]:
+    """Progress callback that moves the bar to `before` plus the time reached [s]."""
+
+    def progress(t: float) -> None:
+        bar.update(before + t - bar.n)
+
+    return progress
+
+
+def run_command(
+    commands: dict[str, Callable[..., Any]], prog: str, description: str, arguments: list[str] | None
+) -> int:
+    """Run one of the commands; a mistake of the user is one message on stderr and status 2."""
+    try:
+        status = tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=description, args=arguments)
+        sys.stdout.flush()
+        return status
+    except DmsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return USER_MISTAKE
+    except BrokenPipeError:
+        # The reader (head, less) has seen enough; what is left to flush at exit must not complain either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

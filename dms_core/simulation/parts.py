@@ -1,0 +1,96 @@
+"""The large parts of a step, called by address.
+
+numba optimises everything that a function calls as a part of that function, so that a tower of ten functions over the
+residual would optimise the residual ten times. Behind an address a part is compiled once; each reads and writes the
+packed model m and world s only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dms_core.assembly.arena import floats, inner, ints
+from dms_core.assembly.calls import PART, address, call_part
+from dms_core.assembly.residual import (
+    evaluate_constraints,
+    evaluate_inputs,
+    evaluate_newton,
+    evaluate_rates,
+    evaluate_residual,
+)
+from dms_core.jit import compiled
+from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.state import BEFORE_JUMP, C0_FACTORED, MODEL, PIVOT, STATE, T_INPUTS
+
+INPUTS, RESIDUAL, CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RATE_MATRIX, RATE_SOLUTION = range(7)
+
+
+@compiled
+def _inputs(m, s):
+    """Inputs at clock[T_INPUTS], from the left or the right of a jump."""
+    before = ints(s, STATE.counts)[BEFORE_JUMP] == 1
+    evaluate_inputs(inner(s, STATE.signals), floats(s, STATE.clock)[T_INPUTS], before, inner(s, STATE.w))
+
+
+@compiled
+def _residual(m, s):
+    """The residual at the present iterate."""
+    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w))
+
+
+@compiled
+def _constraints(m, s):
+    """phi and phi_q v + phi_t at the present iterate."""
+    evaluate_constraints(inner(m, MODEL.constraints), inner(s, STATE.w))
+
+
+@compiled
+def _newton_matrix(m, s):
+    """Residual, factorised Newton matrix for c0 = clock[C0_FACTORED], and clock[PIVOT], its smallest relative pivot."""
+    clock, values, w = floats(s, STATE.clock), floats(s, STATE.newton_values), inner(s, STATE.w)
+    dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
+    evaluate_newton(dynamics, constraints, inner(m, MODEL.newton), w, clock[C0_FACTORED], values)
+    clock[PIVOT] = factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work))
+
+
+@compiled
+def _newton_solution(m, s):
+    """x from b."""
+    values, work = floats(s, STATE.newton_values), floats(s, STATE.newton_work)
+    back_substitute(m, MODEL.newton_lu, values, floats(s, STATE.b), floats(s, STATE.x), work)
+
+
+@compiled
+def _rate_matrix(m, s):
+    """Residual and factorised matrix of the acceleration problem; clock[PIVOT] as above."""
+    values = floats(s, STATE.rate_values)
+    dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
+    evaluate_rates(dynamics, constraints, inner(m, MODEL.rates), inner(s, STATE.w), values)
+    floats(s, STATE.clock)[PIVOT] = factorise(m, MODEL.rate_lu, values, floats(s, STATE.rate_work))
+
+
+@compiled
+def _rate_solution(m, s):
+    """rate_x from rate_b."""
+    values, work = floats(s, STATE.rate_values), floats(s, STATE.rate_work)
+    back_substitute(m, MODEL.rate_lu, values, floats(s, STATE.rate_b), floats(s, STATE.rate_x), work)
+
+
+def part_addresses() -> np.ndarray:
+    """Addresses of the parts in the order of their numbers, compiled or loaded here."""
+    parts = (_inputs, _residual, _constraints, _newton_matrix, _newton_solution, _rate_matrix, _rate_solution)
+    return np.array([address(part, PART, part.__name__) for part in parts], np.int64)
+
+
+@compiled
+def run_part(m, s, part):
+    """Run one part."""
+    call_part(ints(m, MODEL.parts)[part], m, s)
+
+
+@compiled
+def set_inputs(m, s, t, before):
+    """Inputs at t; `before` takes the limit from the left at a jump."""
+    floats(s, STATE.clock)[T_INPUTS] = t
+    ints(s, STATE.counts)[BEFORE_JUMP] = 1 if before else 0
+    run_part(m, s, INPUTS)
