@@ -16,6 +16,7 @@ from dms_core import Model, SolverOptions
 from dms_core.model import Constant
 from dms_core.simulation.dynamics import World
 from exo_env.actions import DRIVES, Drive, drive_inputs
+from exo_env.command_kernel import path_geometry
 from exo_env.ecosystem import Ecosystem
 from exo_env.effort import Effort
 from exo_env.exoskeleton import AGONIST, WornExoskeleton
@@ -96,7 +97,7 @@ class Episode:
         self.model = Model(system, like=template(mode))
         self.world = World(self.model, options)
         # Accelerations and reactions of the start, for the first reading.
-        self.world.advance(0.0)
+        self.world.settle()
         self._excitations = [excitation_name(m) for m in MUSCLES]
 
     @cached_property
@@ -123,12 +124,13 @@ class Episode:
 
     def _holding_tension(self, start: float, activations: np.ndarray) -> float:
         """Agonist tension with which the arm rests at the start [N]; below 0 where the patient needs no help."""
-        needed = self._known(self.ecosystem.weight).resting_moment(start)
+        known = self._known(self.ecosystem.weight)
+        needed, table = known.resting_moment(start), known.arm_table()
         link, g = self.ecosystem.device.lower_link, float(np.linalg.norm(self.arm.gravity))
         x, y, _ = link.centre_of_mass
         needed += link.mass * g * (x * math.cos(start) - y * math.sin(start))
-        for m, a in zip(MUSCLES, activations, strict=True):
-            length, lever = self.arm.muscle_geometry(m, start)
+        for k, (m, a) in enumerate(zip(MUSCLES, activations, strict=True)):
+            length, lever = path_geometry(table, k, start)
             muscle = self.arm.muscle(m)
             needed -= lever * muscle.tension(length, muscle.equilibrium(length, float(a)))
         return needed / self.ecosystem.device.moment_arm(AGONIST, start)

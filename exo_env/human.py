@@ -17,7 +17,7 @@ J. Biomech. 29:1223-1230:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from math import radians
 from typing import Any, Literal, NamedTuple
 
@@ -206,7 +206,7 @@ class Arm:
     def muscle(self, name: str, **more: Any) -> ThelenMuscle:
         """A muscle of the person; `more` are further fields of ThelenMuscle, or others in place of these."""
         facts = {**self.facts["muscle_defaults"], **self.facts["muscles"][name]}
-        k = self._path_factor(name)
+        k = _path_factor(self.person, name)
         size = self.person.strength * self.person.body_mass / MASS_0 * HEIGHT_0 / self.person.height
         facts |= {
             "max_isometric_force": size * facts["max_isometric_force"],
@@ -215,12 +215,6 @@ class Arm:
             "path": self.path(name),
         }
         return ThelenMuscle(**{"name": name, "excitation": excitation_name(name), **facts, **more})
-
-    def _path_factor(self, muscle: str) -> float:
-        """Length of a scaled path over that of arm26, at 90 degrees [-]."""
-        if self.person.height == HEIGHT_0 and self.person.sex == "male":
-            return 1.0
-        return self.muscle_geometry(muscle, radians(90.0))[0] / Arm().muscle_geometry(muscle, radians(90.0))[0]
 
     def inertia_about_elbow(self) -> float:
         """Generalised inertia of the forearm about the elbow axis [kg m^2]."""
@@ -233,6 +227,14 @@ class Arm:
         s = self.segments["forearm"]
         lever = self.rotation(flexion) @ s.centre_of_mass
         return float(self.axis @ np.cross(lever, s.mass * np.array(self.gravity)))
+
+
+@lru_cache(maxsize=64)
+def _path_factor(person: Person, muscle: str) -> float:
+    """Length of a scaled path over that of arm26, at 90 degrees [-]."""
+    if person.height == HEIGHT_0 and person.sex == "male":
+        return 1.0
+    return Arm(person).muscle_geometry(muscle, radians(90.0))[0] / Arm().muscle_geometry(muscle, radians(90.0))[0]
 
 
 def excitation_name(muscle: str) -> str:

@@ -180,6 +180,12 @@ class World:
         self.state = self._world.values
         return True
 
+    def settle(self) -> Result:
+        """Accelerations and multipliers of the present state under the present inputs, for reading before a step."""
+        code = step_control.restart(self._tables.table, self._world.table, self._numbers)
+        self.result = Result.SUCCESS if code else Result.RATES_FAILED
+        return self.result
+
     def read(self, out: np.ndarray | None = None) -> np.ndarray:
         """All sensors at the present time, in the order of model.layout.outputs, shape (n_y,); into `out` if given.
 
