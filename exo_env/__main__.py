@@ -4,6 +4,7 @@ python -m exo_env scenarios --out DIR
 python -m exo_env tune --out DIR
 python -m exo_env arm26 --excitations FILE.csv --start-deg D --start-activation A --t-end T --rtol R --sample DT
                         --out FILE.csv
+python -m exo_env soak --steps N
 """
 
 from __future__ import annotations
@@ -188,10 +189,35 @@ def arm26(
     return 0
 
 
+def soak(steps: int = 100_000, population: str = "evaluation", seed: int = 0, action_mode: str = "rope_tension") -> int:
+    """Random actions in exo/ElbowLift-v0, a new patient an episode: counts of what happened and the worst figures.
+
+    Args:
+        steps: control periods in all.
+        population: of the patients, by name or YAML file.
+        seed: of patients and actions.
+        action_mode: 'rope_tension' or 'pid_setpoint'.
+    """
+    from exo_env.soak import soak as long_run
+
+    if steps < 1:
+        raise InputError(f"--steps {steps}: at least 1 is wanted.")
+    with tqdm(total=steps, unit="step", leave=False, disable=None) as bar:
+        found = long_run(
+            steps, seed=seed, patient=population, action_mode=action_mode, progress=lambda n: bar.update(n - bar.n)
+        )
+    for name, value in found.items():
+        if name != "failures":
+            print(f"{name:24} {value:.4g}" if isinstance(value, float) else f"{name:24} {value}")
+    for sentence in found["failures"]:
+        print(f"  {sentence}")
+    return FAILED_RUN if found["not_finite_or_outside"] else 0
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"scenarios": scenarios, "tune": tune, "arm26": arm26},
+        {"scenarios": scenarios, "tune": tune, "arm26": arm26, "soak": soak},
         "python -m exo_env",
         "A subject with an elbow exoskeleton on a gym machine: scenarios, tuning, and the bare arm.",
         arguments,

@@ -21,9 +21,9 @@ from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import Limits, event
 from exo_env.exoskeleton import Exoskeleton
-from exo_env.human import MUSCLES
-from exo_env.observations import PREVIEW, Observer, Slice, patient_channels
+from exo_env.observations import Observer, Slice
 from exo_env.population import Source, population
+from exo_env.readout import Readout
 from exo_env.repetition import Repetition, Repetitions
 from exo_env.scene import Scene
 
@@ -33,7 +33,104 @@ SMALLEST_STEP, MOST_STEPS = 1e-9, 500_000
 
 
 class ElbowLiftEnv(gymnasium.Env):
-    """The real docstring stands in `lift_page.py` and is put here below."""
+    """Assist a patient who lifts a weight by bending the elbow.
+
+    ## Description
+    A subject with six elbow muscles wears a cable-driven elbow exoskeleton and lifts a weight on a gym machine along a
+    reference (Fig. 8 of the paper, scenario 3). Bodies, joints, ropes, muscles, motors and controller are one system of
+    differential-algebraic equations that advances with its own steps; one `step` holds an action for one control period
+    (50 Hz). One episode is one repetition: rest, flexion, pause, return, of random amplitude, duration and pause, with
+    a random patient and load. The patient is to do as much as possible, the device no more than is needed: effort
+    falls where the device does the work.
+
+    ## Action Space
+    `Box(-1, 1, (2,), float32)`. Numbers beyond -1 to 1 are clipped; a number that is not finite, or another shape, is
+    an error. With `action_mode="rope_tension"` (the default), an action commands tensions, which change by at most
+    2000 N/s and follow with a lag of 0.02 s:
+
+    | Num | Action             | Min | Max | Control Min | Control Max | Unit |
+    |-----|--------------------|-----|-----|-------------|-------------|------|
+    | 0   | agonist tension    | -1  | 1   | 0           | 200         | N    |
+    | 1   | antagonist tension | -1  | 1   | 0           | 200         | N    |
+
+    With `action_mode="pid_setpoint"` the device's own PID holds the reference plus a setpoint change, which passes a
+    critically damped second-order filter of 20 rad/s; its authority changes by at most 10 1/s:
+
+    | Num | Action             | Min | Max | Control Min | Control Max | Unit |
+    |-----|--------------------|-----|-----|-------------|-------------|------|
+    | 0   | setpoint change    | -1  | 1   | -0.2        | 0.2         | rad  |
+    | 1   | authority          | -1  | 1   | 0           | 1           | -    |
+
+    ## Observation Space
+    `Box`, float32, of the groups in `observation`: "device" (the default) is what a worn exoskeleton can measure, "emg"
+    noisy activations, "privileged" the patient's parameters and true muscle forces. An observation times its scale is
+    the reading in its unit; `env.unwrapped.observation_structure` says the same of every group. Of "device":
+
+    | Num | Observation                   | Min  | Max | Unit  | Scale |
+    |-----|-------------------------------|------|-----|-------|-------|
+    | 0   | angle                         | -0.5 | 3   | rad   | 1     |
+    | 1   | rate                          | -20  | 20  | rad/s | 1     |
+    | 2   | tension, agonist              | 0    | 16  | N     | 100   |
+    | 3   | tension, antagonist           | 0    | 16  | N     | 100   |
+    | 4   | guide_force                   | -50  | 50  | N     | 10    |
+    | 5   | reference                     | -0.5 | 3   | rad   | 1     |
+    | 6   | reference_rate                | -20  | 20  | rad/s | 1     |
+    | 7   | preview, in 0.1 s             | -0.5 | 3   | rad   | 1     |
+    | 8   | preview, in 0.2 s             | -0.5 | 3   | rad   | 1     |
+    | 9   | preview, in 0.4 s             | -0.5 | 3   | rad   | 1     |
+    | 10  | last_action, first            | -1   | 1   | -     | 1     |
+    | 11  | last_action, second           | -1   | 1   | -     | 1     |
+
+    ## Rewards
+    The sum of five terms times their weights; `info["reward_terms"]` and `info["reward_weights"]` hold both, and
+    `exo_env/rewards.py` gives reasons and sources.
+
+    | Term       | Value                                                    | Weight |
+    |------------|----------------------------------------------------------|--------|
+    | tracking   | exp(-(error / 10 deg)^2)                                 | 1      |
+    | assistance | -abs(moment of the device) / 10 Nm, at least -2          | 0.2    |
+    | smoothness | -mean square change of the action / 4                    | 0.2    |
+    | reaction   | -(elbow reaction / 500 N - 1) beyond 500 N, at least -2  | 0.2    |
+    | unsafe     | -1 where an event ends the episode                       | 100    |
+
+    ## Starting State
+    At rest on the reference, muscles as the patient's command wants them; with "rope_tension" the agonist holds what
+    they do not. Patient, load (0.5 to 2 kg) and repetition are drawn from the environment's one generator.
+    `reset(options={...})` fixes any of `patient`, `load` [kg], `reference` (fields of a repetition) and
+    `initial_angle_deg`; all else is drawn as without it. `info` of a reset holds what was drawn.
+
+    ## Episode End
+    Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
+    elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
+    `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), at whatever control rate; so the
+    registration has no `max_episode_steps`.
+
+    ## Arguments
+    All by keyword, all JSON.
+
+    | Argument           | Default          | Meaning                                                                  |
+    |--------------------|------------------|--------------------------------------------------------------------------|
+    | `patient`          | `"mixed"`        | population by name or YAML file; fields of one, or of a patient          |
+    | `load`             | 0.5 to 2         | weight [kg], or a distribution                                           |
+    | `exoskeleton`      | `None`           | device by name, or changes of the default one                            |
+    | `reference`        | `None`           | distributions of start_deg, amplitude_deg, rest, duration, pause         |
+    | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`                                                      |
+    | `drive_settings`   | `None`           | changes of the mode's motor or filter, see `exo_env/actions.py`          |
+    | `observation`      | `["device"]`     | groups, in order                                                         |
+    | `noise`            | `True`           | `False`, or a channel's deviation, delay and quantum                     |
+    | `reward_weights`   | `None`           | changes of the weights                                                   |
+    | `limits`           | `None`           | changes of lowest_deg, highest_deg, tension, reaction                    |
+    | `control_rate`     | 50               | [Hz]                                                                     |
+    | `episode_duration` | 6                | [s]                                                                      |
+    | `rtol`             | 0.01             | of the solver; it keeps the angle within 0.03 deg                         |
+    | `render_mode`      | `None`           | `"human"` or `"rgb_array"`                                               |
+
+    `readings()` gives every sensor of the model without noise. A pickled environment keeps settings and generator, and
+    has to be reset.
+
+    ## Version History
+    * v0: first version
+    """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
@@ -115,8 +212,8 @@ class ElbowLiftEnv(gymnasium.Env):
         self._over, self._episode = True, None
         self._begin(options)
         self._over = False
-        self._read()
-        observation = self.observer.observe(self._reading(), self.np_random, first=True)
+        self._readout.update(0)
+        observation = self.observer.observe(self._readout.channels(self._action), self.np_random, first=True)
         self._last = observation
         if self.render_mode == "human":
             self.render()
@@ -151,17 +248,7 @@ class ElbowLiftEnv(gymnasium.Env):
             repetition=repetition, start=start, period=self.period, duration=self.duration, generator=self.np_random,
             options=self.solver,
         )  # fmt: skip
-        n = episode.names
-        self._y = np.zeros(len(n))
-        self._at = np.array([n[name] for name in _READ])
-        self._muscle_force = np.array([n[f"{m}.sensor.tendon_force"] for m in MUSCLES])
-        self._muscle_activation = np.array([n[f"{m}.sensor.activation"] for m in MUSCLES])
-        self._course = episode.reference(episode.times)
-        ahead = [np.minimum(episode.times + t, self.duration) for t in PREVIEW]
-        self._preview = np.stack([episode.reference(times)[:, 0] for times in ahead], axis=1)
-        self._patient_row = {c.name: getattr(patient, c.name) for c in patient_channels()}
-        # How the guide pushes: along the plane's normal, the x axis of the lower link.
-        self._axes = episode.worn.axes
+        self._readout = Readout(episode)
         return episode
 
     @property
@@ -188,20 +275,18 @@ class ElbowLiftEnv(gymnasium.Env):
         episode, used = self.episode, checked_action(action)
         if self._over:
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
-        k, before = self._step, self._action
-        excitations = episode.effort.step(
-            episode.wanted[k], error=self._course[k, 0] - self._angle, rate=self._rate, share=self._share
-        )
+        k, before, true = self._step, self._action, self._readout
+        excitations = episode.effort.step(episode.wanted[k], error=-true.error, rate=true.rate, share=true.share)
         episode.advance(k, self.drive.held(used, episode.held, self.period), excitations)
         self._step, self._action, self._result = k + 1, used, episode.world.result
         happened = self._failure()
         if happened is None:
-            self._read()
-            self._last = self.observer.observe(self._reading(), self.np_random, first=False)
-            happened = event(self.limits, self._angle, self._tensions, self._reaction)
+            true.update(k + 1)
+            self._last = self.observer.observe(true.channels(used), self.np_random, first=False)
+            happened = event(self.limits, true.angle, true.tensions, true.reaction)
         found = rewards.terms(
-            error=self._angle - self._course[k + 1, 0], moment=self._exo_moment, reaction=self._reaction, action=used,
-            before=before, unsafe=happened is not None,
+            error=true.error, moment=true.exo_moment, reaction=true.reaction, action=used, before=before,
+            unsafe=happened is not None,
         )  # fmt: skip
         terminated, truncated = happened is not None, k + 1 == len(episode.times) - 1
         self._over = terminated or truncated
@@ -215,44 +300,14 @@ class ElbowLiftEnv(gymnasium.Env):
             return f"{self._result.value} Stopped at t = {self.episode.world.time:.6g} s."
         return None
 
-    def _read(self) -> None:
-        """True readings at the present time, and what follows from them."""
-        self.episode.world.read(self._y)
-        y = self._y[self._at]
-        self._angle, self._rate, self._hinge, self._hinge_rate = map(float, y[:4])
-        self._tensions = np.maximum(y[4:6], 0.0)
-        self._muscle_moment, self._exo_moment = float(y[6]), float(y[7])
-        self._reaction = float(np.linalg.norm(y[8:11]))
-        normal = self._axes @ (math.cos(self._hinge), math.sin(self._hinge), 0.0)
-        self._guide = float(y[11:14] @ normal)
-        self._share = device_share(self._muscle_moment, self._exo_moment)
-
-    def _reading(self) -> dict[str, Any]:
-        """What the channels show, [unit of the channel]."""
-        k, effort = self._step, self.episode.effort
-        return {
-            "angle": self._hinge, "rate": self._hinge_rate, "tension": self._tensions, "guide_force": self._guide,
-            "reference": self._course[k, 0], "reference_rate": self._course[k, 1], "preview": self._preview[k],
-            "last_action": self._action, "emg": self._y[self._muscle_activation], **self._patient_row,
-            "load": self.episode.ecosystem.weight, "muscle_force": self._y[self._muscle_force],
-            "fatigued": effort.fatigued, "effort": effort.effort, "device_share": self._share,
-        }  # fmt: skip
-
     def readings(self) -> dict[str, float]:
         """Everything of the paper's figures 9 to 13 at the present time, without noise: every sensor of the model.
 
-        Beside them 'time' [s], 'reference' [rad], 'tracking_error' [rad], 'elbow_reaction' [N], 'device_share',
-        'effort' [-], the inputs held, and counts and worst errors of the solver. Units: `reading_units()`.
+        Beside them 'time' [s], 'reference' and 'tracking_error' [rad], 'elbow_reaction' [N], 'device_share' and
+        'effort' [-], the inputs held, counts and worst errors of the solver. Units: `reading_units()`.
         """
-        episode = self.episode
-        found = {name: float(self._y[k]) for name, k in episode.names.items()}
-        found |= {
-            "time": episode.world.time, "reference": float(self._course[self._step, 0]),
-            "tracking_error": self._angle - float(self._course[self._step, 0]), "elbow_reaction": self._reaction,
-            "device_share": self._share, "effort": episode.effort.effort,
-        }  # fmt: skip
-        found |= {name: float(x) for name, x in zip(self.drive.inputs, episode.held, strict=True)}
-        return found | {f"solver.{name}": float(x) for name, x in episode.world.stats().as_dict().items()}
+        _ = self.episode
+        return self._readout.readings()
 
     def reading_units(self) -> dict[str, str]:
         """Unit of each sensor in `readings`."""
@@ -265,7 +320,7 @@ class ElbowLiftEnv(gymnasium.Env):
             "patient": e.patient.model_dump(),
             "load": float(e.ecosystem.weight),
             "reference": e.repetition.model_dump(),
-            "initial_angle_deg": math.degrees(self._angle),
+            "initial_angle_deg": math.degrees(self._readout.angle),
         }
 
     def _info(self, found: dict[str, float], happened: str | None) -> dict[str, Any]:
@@ -274,10 +329,10 @@ class ElbowLiftEnv(gymnasium.Env):
             "reward_terms": dict(found),
             "reward_weights": self.weights.model_dump(),
             "time": float(self.episode.times[self._step]),
-            "tracking_error_deg": math.degrees(self._angle - self._course[self._step, 0]),
-            "device_share": self._share,
+            "tracking_error_deg": math.degrees(self._readout.error),
+            "device_share": self._readout.share,
             "effort": self.episode.effort.effort,
-            "elbow_reaction": self._reaction,
+            "elbow_reaction": self._readout.reaction,
             "solver_failed": self._result is not Result.SUCCESS,
         }
         if happened is not None:
@@ -288,12 +343,8 @@ class ElbowLiftEnv(gymnasium.Env):
         """What a picture shows of the present time."""
         from exo_env.staging import staged
 
-        episode = self.episode
-        k = self._step
-        return staged(
-            episode, self._angle, self._hinge, float(self._course[k, 0]), self._tensions,
-            self._y[self._muscle_activation], self._label(),
-        )  # fmt: skip
+        episode, r = self.episode, self._readout
+        return staged(episode, r.angle, r.hinge, r.reference, r.tensions, r.activations, self._label())
 
     def _label(self) -> str:
         """Names the patient in a picture."""
@@ -326,29 +377,6 @@ class ElbowLiftEnv(gymnasium.Env):
     def __setstate__(self, state: dict[str, Any]) -> None:
         type(self).__init__(self, **state["settings"])
         self._np_random, self._np_random_seed = state["generator"], state["seed"]
-
-
-_READ = (
-    "elbow_angle.angle", "elbow_angle.rate", "exo_angle.angle", "exo_angle.rate", "agonist_tension",
-    "antagonist_tension", "muscle_moment", "exo_moment", *(f"elbow_reaction.F{x}" for x in "xyz"),
-    *(f"guide_force.F{x}" for x in "xyz"),
-)  # fmt: skip
-"""Sensors that a step needs."""
-
-
-def device_share(muscles: float, device: float) -> float:
-    """What the device carries of the moment that both give, from 0 to 1 [-].
-
-    Args:
-        muscles: moment of the muscles [Nm].
-        device: moment of the device [Nm].
-    """
-    both = muscles + device
-    if both == 0.0:
-        return 0.0
-    way = math.copysign(1.0, both)
-    carried, own = max(way * device, 0.0), max(way * muscles, 0.0)
-    return carried / (carried + own)
 
 
 def _load(load: float | Mapping[str, Any] | None) -> Any:

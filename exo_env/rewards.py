@@ -1,17 +1,18 @@
 """The reward: named terms between about -1 and 1, times weights; each is in `info`, so that none hides in the sum.
 
-    tracking     exp(-(e / 10 deg)^2)            1 on the reference. 10 deg is the maximal error of a clinical goniometer
-                                                 at the elbow (Chapleau et al. 2011, Clin. Orthop. Relat. Res.
-                                                 469:3134-3140): what a therapist cannot tell from the reference costs
-                                                 little, and what everybody sees earns nothing.
-    assistance   -|M_exo| / 10 Nm, at least -2   the device's moment. People after stroke let a robot do the work
-                                                 (Wolbrecht et al. 2008, IEEE TNSRE 16:286-297), so help is to be
-                                                 given no more than is needed. 10 Nm holds about 2 kg; assumed.
-    smoothness   -mean((a - a_before)^2) / 4     -1 for an action that jumps from end to end. Assumed.
-    reaction     -max(F / 500 N - 1, 0), at      elbow reaction beyond what lifting 2 kg without a device costs in this
-                 least -2                        model. Assumed.
-    unsafe       -1 once, where an event         see events.py.
-                 ends the episode
+    tracking     exp(-(e / 10 deg)^2)
+                 1 on the reference. 10 deg is the maximal error of a clinical goniometer at the elbow (Chapleau et al.
+                 2011, Clin. Orthop. Relat. Res. 469:3134-3140): what a therapist cannot tell from the reference costs
+                 little, and what everybody sees earns nothing.
+    assistance   -|M_exo| / 10 Nm, at least -2
+                 The device's moment. People after stroke let a robot do the work (Wolbrecht et al. 2008, IEEE TNSRE
+                 16:286-297), so help is to be given no more than is needed. 10 Nm is about twice what 1 kg and the
+                 forearm need; assumed.
+    smoothness   -mean((a - a_before)^2) / 4
+                 -1 for an action that jumps from end to end; assumed.
+    reaction     -max(F / 500 N - 1, 0), at least -2
+                 Elbow reaction above that of quiet lifting, which pulling against oneself causes; assumed.
+    unsafe       -1 once, where an event ends the episode, see events.py
 
 With the default weights a second of good tracking is worth 50, a second of 10 Nm of help costs 10, and an unsafe event
 100: two seconds of tracking beside what is lost by the end of the episode. The weights are assumed.
