@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from dms_core import SolverOptions
 from dms_core.config_files import configs
-from dms_core.errors import DmsError, InputError, choices
+from dms_core.errors import InputError, choices
 from dms_core.results import Result
 from exo_env import rewards
 from exo_env.actions import checked_action, drive
@@ -23,7 +23,6 @@ from exo_env.events import Limits, event
 from exo_env.exoskeleton import Exoskeleton
 from exo_env.human import MUSCLES
 from exo_env.observations import PREVIEW, Observer, Slice, patient_channels
-from exo_env.patient import PATIENT
 from exo_env.population import Source, population
 from exo_env.repetition import Repetition, Repetitions
 from exo_env.scene import Scene
