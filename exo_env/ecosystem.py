@@ -10,8 +10,9 @@ Inputs: "psi" the reference [rad], "assistance" the authority of the controller 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dms_core.model import (
     Constant,
@@ -71,6 +72,15 @@ class Ecosystem(Settings):
     guide: GuideKind = Field(default="plane", description="guide between lower link and forearm: 1, 2 or 5 rows")
     misalignment: Misalignment = Misalignment()
     proprioception: Proprioception = Proprioception()
+
+    @model_validator(mode="after")
+    def _free_elbow(self) -> Self:
+        """A line or prismatic guide leaves an elbow free only if its axis is that of the hinge."""
+        if self.guide != "plane" and self.misalignment != Misalignment():
+            raise ValueError(
+                f"guide '{self.guide}' with a misaligned device locks the elbow; the one-row guide 'plane' lets it move"
+            )
+        return self
 
     def system(
         self,

@@ -43,6 +43,8 @@ SAMPLE = 0.001
 """Interval of its samples [s]."""
 FIRST = 2000.0
 """Gain at which the search begins [N/rad]; it is doubled until an oscillation lasts."""
+DOUBLINGS = 20
+"""Doublings of the gain after which a device counts as stable at any; the search then says so."""
 TOLERANCE = 0.002
 """Relative width of the bracket of Kc."""
 PROBE = 100.0
@@ -114,7 +116,9 @@ def tune(device: Exoskeleton, progress: Callable[[float, float], None] | None = 
         return known[kp]
 
     high = FIRST
-    while oscillation(*response(high)).growth < SUSTAINED:
+    for _ in range(DOUBLINGS):
+        if oscillation(*response(high)).growth >= SUSTAINED:
+            break
         high *= 2.0
     critical = find_critical_gain(response, high / 2.0, high, tolerance=TOLERANCE)
     return Tuning(critical, ziegler_nichols(critical.Kc, critical.Tc), what_limits(device, critical.Kc))

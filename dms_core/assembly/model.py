@@ -131,7 +131,11 @@ class Model:
         self._signals, self._keep_alive = signal_tables(layout)
         self.second_order = np.array([c.differential_rate for c in layout.coordinates])
         known = like if like is not None and same_structure(like.layout, layout) else None
-        self.start: Start = assemble(self, known.start if known else None)
+        # Which rows are redundant depends on the numbers too: an exact alignment may be lost.
+        reuse_rows = known is not None and len(known.start.redundant) == 0
+        self.start: Start = assemble(self, known.start if known is not None and reuse_rows else None)
+        if known is not None and not np.array_equal(self.start.active, known.start.active):
+            known = None
         if known:
             self._tables = Packed(self._with_orders_of(known))
         else:
@@ -151,8 +155,8 @@ class Model:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Second-order coordinates less independent rows: mechanical freedoms and second-order elements."""
-        return int(self.second_order.sum()) - len(self.start.active)
+        """Mechanical freedoms: coordinates of bodies less independent rows."""
+        return sum(len(body.coordinates()) for body in self.system.bodies) - len(self.start.active)
 
     def new_work(self) -> Work:
         """Fresh work arrays of this model."""

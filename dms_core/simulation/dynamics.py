@@ -20,6 +20,7 @@ from dms_core.simulation.state import (
     FACTORISATIONS,
     H_LEAST,
     H_MOST,
+    H_WANTED,
     ITERATIONS,
     MU,
     PHI,
@@ -145,7 +146,9 @@ class World:
             raise InputError(f"t_end = {t_end} s; a time not before the present {self.time:.6g} s is wanted.")
         try:
             code, stuck = self._advance(float(t_end), progress), -math.inf
-            while code == step_control.MATRIX_SINGULAR and self.time > stuck and self._reorder():
+            while code == step_control.MATRIX_SINGULAR:
+                if not (self._reorder() if self.time > stuck else self._shorten()):
+                    break
                 stuck = self.time
                 code = self._advance(float(t_end), progress)
         except KeyboardInterrupt:
@@ -198,6 +201,12 @@ class World:
             self._world.table, np.array([self.time]), s.q[None], s.v[None], s.vd[None], s.lam[None], present, y[None]
         )
         return y
+
+    def _shorten(self) -> bool:
+        """A quarter of the step for a matrix that is singular far from the present state; False below the smallest."""
+        clock = self.state.clock
+        clock[H_WANTED] *= 0.25
+        return self.options.fixed_step is None and bool(clock[H_WANTED] > self.options.h_min)
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""

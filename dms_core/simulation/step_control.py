@@ -35,6 +35,8 @@ DONE, BUFFER_FULL, STEP_TOO_SMALL, NEWTON_FAILED, MATRIX_SINGULAR, TOO_MANY_STEP
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
+LONGEST_START = 1e-3
+"""Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
 
 
 @compiled
@@ -53,7 +55,7 @@ def first_step(s, o):
     vd, wq, fastest = floats(s, STATE.vd), floats(s, STATE.wq), 0.0
     for i in range(wq.shape[0]):
         fastest = max(fastest, abs(vd[i]) / wq[i])
-    return min(math.sqrt(0.2 / fastest), o.h_max) if fastest > 0.0 else o.h_max
+    return min(math.sqrt(0.2 / fastest), o.h_max, LONGEST_START) if fastest > 0.0 else min(o.h_max, LONGEST_START)
 
 
 @compiled

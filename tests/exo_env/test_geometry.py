@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, simulate
+from dms_core.errors import InputError
 from dms_core.model import Constant
 from exo_env.ecosystem import Ecosystem
 from exo_env.exoskeleton import Exoskeleton, Misalignment
@@ -30,7 +31,7 @@ def test_the_default_system_is_the_papers():
     assert (len(model.system.bodies), len(bodies)) == (7, 49)
     assert (model.n_phi, len(model.active_rows), model.redundant_rows) == (47, 47, [])
     # Elbow and handle, and the controller's integral, which is a second-order coordinate too.
-    assert model.degrees_of_freedom == 2 + 1
+    assert model.degrees_of_freedom == 2
     # 0.141 is found; a model near a lost rank would fall far below.
     assert model.start.singular_values.min() > 0.1
 
@@ -121,3 +122,8 @@ def test_a_misaligned_device_runs():
     assert trajectory.stats.largest_phi < 1e-9
     # The controller still leads the hinge to the top of the exercise.
     assert np.degrees(y["exo_angle.angle"].max()) == pytest.approx(100.0, abs=1.0)
+
+
+def test_a_guide_that_would_lock_a_misaligned_elbow_is_refused():
+    with pytest.raises(InputError, match="locks the elbow"):
+        Ecosystem(guide="slider", misalignment=Misalignment(shift=(0.004, 0.0, 0.0)))

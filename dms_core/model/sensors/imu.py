@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from dms_core.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
+from dms_core.model.forces.gravity import Gravity
 from dms_core.model.rotations import add_gradient, dot, euler_parameters, k_times, rotated, sub, vec
 from dms_core.model.sensors.point import point_acceleration
 
@@ -67,7 +69,9 @@ class Imu(Sensor):
     kernel: ClassVar = imu
     body: str = Field(description="body")
     point: Vector = Field(default=(0.0, 0.0, 0.0), description="place of the sensor in the frame of the body [m]")
-    gravity: Vector = Field(default=(0.0, -9.80665, 0.0), description="acceleration of gravity, ground axes [m/s^2]")
+    gravity: Vector | None = Field(
+        default=None, description="acceleration of gravity, ground axes [m/s^2]; the sum of the system's when not given"
+    )
 
     def outputs(self) -> tuple[tuple[str, str], ...]:
         """Specific force, then angular velocity."""
@@ -76,4 +80,6 @@ class Imu(Sensor):
 
     def place(self, system) -> Placement:
         """One body; the point relative to its centre of mass."""
-        return Placement(bodies=(self.body,), numbers=(*system.arm(self.body, self.point), *self.gravity))
+        fields = [force.acceleration for force in system.forces if isinstance(force, Gravity)]
+        gravity = self.gravity if self.gravity is not None else np.sum([(0.0, 0.0, 0.0), *fields], axis=0)
+        return Placement(bodies=(self.body,), numbers=(*system.arm(self.body, self.point), *map(float, gravity)))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dms_core.model.bodies.rigid_body import RigidBody
+from dms_core.model.forces import Gravity
 from dms_core.model.frames import rotation_matrix, unit
 from dms_core.model.sensors import Imu, Point
 from dms_core.model.system import System
@@ -58,7 +59,7 @@ def test_ground_point_rests() -> None:
 
 def test_accelerometer_at_rest_shows_minus_g_in_body_axes() -> None:
     """Rest in a turned pose."""
-    sensor = Imu(name="imu", body="arm", point=PLACE)
+    sensor = Imu(name="imu", body="arm", point=PLACE, gravity=G)
     q, v, a = turning(AXIS, ANGLE, 0.0, 0.0)
     y = sensed(sensor, sensor.place(_system()), q, v, a)
     assert y[:3] == pytest.approx(-rotation_matrix(q[3:]).T @ G, abs=ROUNDING)
@@ -67,7 +68,7 @@ def test_accelerometer_at_rest_shows_minus_g_in_body_axes() -> None:
 
 def test_accelerometer_in_free_fall_shows_nothing() -> None:
     """The centre of mass falls with g."""
-    sensor = Imu(name="imu", body="arm", point=CENTRE)
+    sensor = Imu(name="imu", body="arm", point=CENTRE, gravity=G)
     q, v, a = turning(AXIS, ANGLE, RATE, ACCELERATION)
     a[:3] = G
     assert sensed(sensor, sensor.place(_system()), q, v, a)[:3] == pytest.approx(np.zeros(3), abs=ROUNDING)
@@ -75,8 +76,15 @@ def test_accelerometer_in_free_fall_shows_nothing() -> None:
 
 def test_gyroscope_and_accelerometer_of_a_turning_body() -> None:
     """About a fixed axis the angular velocity is the same in ground and body axes."""
-    sensor = Imu(name="imu", body="arm", point=PLACE)
+    sensor = Imu(name="imu", body="arm", point=PLACE, gravity=G)
     q, v, a = turning(AXIS, ANGLE, RATE, ACCELERATION)
     y = sensed(sensor, sensor.place(_system()), q, v, a)
     assert y[:3] == pytest.approx(rotation_matrix(q[3:]).T @ (_circular()[2] - np.array(G)), abs=ROUNDING)
     assert y[3:] == pytest.approx(RATE * unit(AXIS, "axis"), abs=ROUNDING)
+
+
+def test_gravity_of_the_system_is_taken_when_none_is_given() -> None:
+    body = RigidBody(name="arm", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    sensor = Imu(name="imu", body="arm")
+    system = System(bodies=[body], forces=[Gravity(name="g", acceleration=(0.0, 0.0, -3.7))], sensors=[sensor])
+    assert sensor.place(system).numbers[3:] == (0.0, 0.0, -3.7)
