@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -130,7 +130,7 @@ class ElbowLiftEnv(gymnasium.Env):
     * v0: first version
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
     def __init__(
         self,
@@ -358,7 +358,8 @@ class ElbowLiftEnv(gymnasium.Env):
         if self._renderer is None:
             from exo_env.rendering import Renderer
 
-            self._renderer = Renderer(self.render_mode, fps=self.metadata["render_fps"])
+            mode: Any = self.render_mode
+            self._renderer = Renderer(mode, fps=self.metadata["render_fps"])
         return self._renderer.draw(self.scene())
 
     def close(self) -> None:

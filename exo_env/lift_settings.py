@@ -18,7 +18,7 @@ LEAST_LOAD, MOST_LOAD = 0.05, 50.0
 
 def within(value: Any, low: float, high: float) -> bool:
     """Whether a value is a number between two limits."""
-    return isinstance(value, int | float | np.number) and low <= value <= high
+    return isinstance(value, int | float | np.number) and bool(low <= value <= high)
 
 
 def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:
