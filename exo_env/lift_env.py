@@ -346,9 +346,7 @@ class ElbowLiftEnv(gymnasium.Env):
     def _label(self) -> str:
         """Names the patient in a picture."""
         p = self.episode.patient
-        title = self.population.title or "patient"
-        flexors, extensors = p.maximum_activation_flexors, p.maximum_activation_extensors
-        return f"{title}: flexors {flexors:.0%}, extensors {extensors:.0%}"
+        return f"flexors {p.maximum_activation_flexors:.0%}, extensors {p.maximum_activation_extensors:.0%}"
 
     def render(self) -> np.ndarray | None:
         """The arm from the side: an array of shape (480, 480, 3) in mode 'rgb_array', a window in mode 'human'."""

@@ -26,12 +26,12 @@ def main() -> None:
     """Print a table."""
     print(f"{'mode':14} {'amplitude':>9} {'steps/s':>8} {'MyoSuite':>9} {'resets':>7} {'reset ms':>9}")
     for mode, amplitude in (("rope_tension", 1.0), ("rope_tension", 0.2), ("pid_setpoint", 1.0)):
-        env, resets = ElbowLiftEnv(action_mode=mode), [0]
-        actions = np.random.default_rng(0)
+        env, resets, generator = ElbowLiftEnv(action_mode=mode), [0], np.random.default_rng(0)
+        actions = amplitude * generator.uniform(-1.0, 1.0, (STEPS, 2))
 
-        def run(env: ElbowLiftEnv = env, amplitude: float = amplitude, resets: list[int] = resets) -> None:
-            for _ in range(STEPS):
-                *_, terminated, truncated, _ = env.step(amplitude * actions.uniform(-1.0, 1.0, 2))
+        def run(env: ElbowLiftEnv = env, actions: np.ndarray = actions, resets: list[int] = resets) -> None:
+            for action in actions:
+                *_, terminated, truncated, _ = env.step(action)
                 if terminated or truncated:
                     env.reset()
                     resets[0] += 1
