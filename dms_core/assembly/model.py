@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,12 @@ NEARBY_STATES, NEARBY = 6, 0.1
 VANISHING = 1e-3
 """Least size of an entry over those states, relative to one of them, below which it is no pivot."""
 
-GOOD_PIVOT = 1e-6
-"""Smallest relative pivot with which no other order is tried: ten digits are left."""
+THRESHOLDS = (0.1, 0.3, 0.03)
+"""Sizes that a pivot must have within its row, tried in turn: another threshold, another order."""
+
+GOOD_PIVOT = 1e-9
+"""Smallest relative pivot with which no other order is tried: seven digits are left, and the rows of fast first-order
+states are by themselves small beside the commands they follow."""
 
 
 @dataclass
@@ -57,14 +62,14 @@ class LinearSystem:
     columns: np.ndarray
     names: list[str]
 
-    def ordered(self, values: np.ndarray) -> tuple[Any, LuTables]:
+    def ordered(self, values: np.ndarray, threshold: float) -> tuple[Any, LuTables]:
         """(scatter into the LU, LU tables) for an elimination order chosen by these values.
 
         Raises:
             ModelError: the matrix is singular; names the unknowns that nothing determines.
         """
         try:
-            lu = plan(len(self.names), self.rows, self.columns, values)
+            lu = plan(len(self.names), self.rows, self.columns, values, threshold=threshold)
         except SingularMatrixError as error:
             names = ", ".join(f"'{self.names[k]}'" for k in error.columns[:4])
             raise ModelError(
@@ -85,10 +90,10 @@ class LinearSystem:
         """
         least = np.min(np.abs(samples), axis=0)
         best, found, problem = -1.0, None, None
-        for sample in samples:
+        for sample, threshold in product(samples, THRESHOLDS):
             values = np.where(least < VANISHING * np.abs(sample), np.copysign(least, sample), sample)
             try:
-                candidate = self.ordered(values)
+                candidate = self.ordered(values, threshold)
             except ModelError as error:
                 problem = error
                 continue

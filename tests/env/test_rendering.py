@@ -14,7 +14,8 @@ pytest.importorskip("pygame")
 @pytest.fixture
 def env(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
-    made = gymnasium.make("exo/ElbowLift-v0", render_mode="rgb_array", patient="stroke_mild", action_mode="pid_setpoint")
+    settings = {"render_mode": "rgb_array", "patient": "stroke_mild", "action_mode": "pid_setpoint"}
+    made = gymnasium.make("exo/ElbowLift-v0", **settings)
     yield made
     made.close()
 
