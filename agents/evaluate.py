@@ -9,8 +9,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.baselines import Policy
 from agents.measures import MEASURES, Record, measured
+from agents.policy import Policy
 from agents.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, interquartile_mean, mean
 from dms_core.errors import InputError
 from exo_env.population import Source, population
@@ -75,10 +75,10 @@ def evaluate(
 def episode(env: gymnasium.Env, acting: Policy, seed: int) -> dict[str, Any]:
     """Measures of one episode, with load, repetition and what ended it."""
     world: Any = env.unwrapped
-    observation, info = env.reset(seed=seed)
-    drawn = info
+    observation, drawn = env.reset(seed=seed)
+    info = drawn
     acting.reset(env)
-    record = Record(Repetition(**info["reference"]), world.period)
+    record = Record(Repetition(**drawn["reference"]), world.period)
     record.add(world.readings())
     over = False
     while not over:

@@ -16,7 +16,7 @@ import numpy as np
 from exo_env.repetition import Repetition
 
 SPARC_CUTOFF, SPARC_THRESHOLD, SPARC_PADDING = 10.0, 0.05, 4
-"""Largest frequency [Hz], least amplitude [-], and doublings of the transform's length (Balasubramanian et al. 2015)."""
+"""Largest frequency [Hz], least amplitude [-], doublings of the transform's length (Balasubramanian et al. 2015)."""
 FEWEST_SAMPLES = 8
 """Of a speed profile worth a smoothness."""
 
@@ -117,8 +117,8 @@ def sparc(speed: np.ndarray, frequency: float) -> float:
     """Spectral arc length of a speed profile (Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet 2015) [-].
 
     Minus the length of the curve of the speed's amplitude spectrum, frequency and amplitude both scaled to 1, up to the
-    last frequency below 10 Hz whose amplitude is 5 % of that at 0 Hz. The closer to 0, the smoother; -1.4 to -1.6 is a
-    smooth reach. NaN where there is no movement or too little of it.
+    last frequency below 10 Hz whose amplitude is 5 % of that at 0 Hz. The closer to 0, the smoother; a minimum-jerk
+    reach has -1.41. NaN where there is no movement or too little of it.
 
     Args:
         speed: shape (n,).
