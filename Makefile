@@ -15,7 +15,7 @@ help:
 	@echo "make bench  speed, as a table"
 	@echo "make lint   ruff and mypy"
 	@echo "make format rewrite the sources in the project's layout"
-	@echo "make docs   generate docs/model-files.md from the code"
+	@echo "make docs   generate docs/model-files.md and the picture of the README"
 	@echo "make clean  remove .venv, out, build products and compiled kernels"
 
 # Made again when it is missing or when the dependencies change.
@@ -47,6 +47,8 @@ format: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python -m dms_core schema --out docs/model-files.md
+	$(BIN)/python -m exo_env scenarios --out $(OUT)
+	cp $(OUT)/fig12_joint_moments.png docs/scenarios.png
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

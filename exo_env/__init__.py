@@ -3,11 +3,11 @@
 Importing it registers the environment exo/ElbowLift-v0 with Gymnasium and loads nothing else; take what you need from
 the modules:
 
-    lift_env                          the environment; actions, observations, rewards, events, repetition, episode
-
+    lift_env                          the environment, made of actions, observations, rewards, events, episode
     human, exoskeleton, gym_machine   the three subsystems of Fig. 8, from configs/
     ecosystem                         joins them into one dms_core System
     motor_command                     what the subject's muscles are told
+    patient, population, effort       who is assisted, and how a patient's command becomes excitations
     scenarios, orderings, tune        the paper's use cases and its controller tuning
     arm26                             the bare arm under a table of excitations
 """

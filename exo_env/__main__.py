@@ -203,9 +203,11 @@ def soak(steps: int = 100_000, population: str = "evaluation", seed: int = 0, ac
     if steps < 1:
         raise InputError(f"--steps {steps}: at least 1 is wanted.")
     with tqdm(total=steps, unit="step", leave=False, disable=None) as bar:
-        found = long_run(
-            steps, seed=seed, patient=population, action_mode=action_mode, progress=lambda n: bar.update(n - bar.n)
-        )
+
+        def progress(done: int) -> None:
+            bar.update(done - bar.n)
+
+        found = long_run(steps, seed=seed, patient=population, action_mode=action_mode, progress=progress)
     for name, value in found.items():
         if name != "failures":
             print(f"{name:24} {value:.4g}" if isinstance(value, float) else f"{name:24} {value}")

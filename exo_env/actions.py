@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dms_core.errors import InputError, choices
 from dms_core.model import Constant, Input, ReferenceFilter, RopeActuator
@@ -36,36 +36,49 @@ class RopeTension(Settings):
     time_constant: float = Field(
         default=0.02, ge=0.001, le=0.5, description="lag of the tension [s]; assumed: 8 Hz, of a series elastic drive"
     )
-    max_tension: float = Field(
-        default=200.0, gt=1.0, le=1500.0, description="largest command [N]; assumed: holds 2 kg in a limp arm"
+    max_tension: tuple[float, float] = Field(
+        default=(200.0, 100.0),
+        description="largest command of agonist and antagonist [N]; assumed: 200 N hold 2 kg in a limp arm, and "
+        "gravity extends the elbow anyway",
     )
     rate_limit: float = Field(default=2000.0, gt=0.0, description="largest change of a command [N/s]; assumed")
 
+    @model_validator(mode="after")
+    def _pulling(self):
+        if not all(1.0 < x <= 1500.0 for x in self.max_tension):
+            raise ValueError(f"max_tension = {list(self.max_tension)}: two numbers above 1 and up to 1500 N are wanted")
+        return self
+
     def largest(self, worn: WornExoskeleton) -> float:
         """Largest tension of a motor [N]."""
-        return self.max_tension
+        return max(self.max_tension)
 
     def start(self, holding_tension: float) -> np.ndarray:
         """Values of the inputs at the start: the arm is held by the agonist."""
-        return np.array([min(max(holding_tension, 0.0), self.max_tension), 0.0])
+        return np.array([min(max(holding_tension, 0.0), self.max_tension[0]), 0.0])
 
     def held(self, action: np.ndarray, before: np.ndarray, period: float) -> np.ndarray:
         """Values of the inputs over the coming period [N], shape (2,)."""
-        wanted, change = 0.5 * (action + 1.0) * self.max_tension, self.rate_limit * period
+        wanted, change = 0.5 * (action + 1.0) * np.array(self.max_tension), self.rate_limit * period
         return np.clip(wanted, before - change, before + change)
 
     def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
         """The device with motors that follow the commands."""
-        names = dict(zip((f"{AGONIST}_motor", f"{ANTAGONIST}_motor"), COMMANDS, strict=True))
+        sides = {f"{AGONIST}_motor": 0, f"{ANTAGONIST}_motor": 1}
         return [
-            RopeActuator(
-                name=f.name, command=names[f.name], time_constant=self.time_constant, max_tension=self.max_tension,
-                start_tension=float(start[COMMANDS.index(names[f.name])]),
-            )
-            if isinstance(f, RopeActuator)
-            else f
+            self._motor(f.name, sides[f.name], start) if f.name in sides else f
             for f in worn.forces(REFERENCE, ASSISTANCE)
-        ]  # fmt: skip
+        ]
+
+    def _motor(self, name: str, side: int, start: np.ndarray) -> RopeActuator:
+        """A motor that follows the command of its side."""
+        return RopeActuator(
+            name=name,
+            command=COMMANDS[side],
+            time_constant=self.time_constant,
+            max_tension=self.max_tension[side],
+            start_tension=float(start[side]),
+        )
 
 
 class PidSetpoint(Settings):

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from dms_core import SolverOptions
-from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from dms_core.results import Result
 from exo_env import rewards
 from exo_env.actions import checked_action, drive
-from exo_env.distributions import distribution
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import Limits, event
-from exo_env.exoskeleton import Exoskeleton
+from exo_env.lift_settings import load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
 from exo_env.population import Source, population
 from exo_env.readout import Readout
@@ -51,7 +49,7 @@ class ElbowLiftEnv(gymnasium.Env):
     | Num | Action             | Min | Max | Control Min | Control Max | Unit |
     |-----|--------------------|-----|-----|-------------|-------------|------|
     | 0   | agonist tension    | -1  | 1   | 0           | 200         | N    |
-    | 1   | antagonist tension | -1  | 1   | 0           | 200         | N    |
+    | 1   | antagonist tension | -1  | 1   | 0           | 100         | N    |
 
     With `action_mode="pid_setpoint"` the device's own PID holds the reference plus a setpoint change, which passes a
     critically damped second-order filter of 20 rad/s; its authority changes by at most 10 1/s:
@@ -88,7 +86,7 @@ class ElbowLiftEnv(gymnasium.Env):
     | Term       | Value                                                    | Weight |
     |------------|----------------------------------------------------------|--------|
     | tracking   | exp(-(error / 10 deg)^2)                                 | 1      |
-    | assistance | -abs(moment of the device) / 10 Nm, at least -2          | 0.2    |
+    | assistance | -abs(moment of the device) / 10 Nm, at least -2          | 0.5    |
     | smoothness | -mean square change of the action / 4                    | 0.2    |
     | reaction   | -(elbow reaction / 500 N - 1) beyond 500 N, at least -2  | 0.2    |
     | unsafe     | -1 where an event ends the episode                       | 100    |
@@ -122,7 +120,7 @@ class ElbowLiftEnv(gymnasium.Env):
     | `limits`           | `None`           | changes of lowest_deg, highest_deg, tension, reaction                    |
     | `control_rate`     | 50               | [Hz]                                                                     |
     | `episode_duration` | 6                | [s]                                                                      |
-    | `rtol`             | 0.01             | of the solver; it keeps the angle within 0.03 deg                         |
+    | `rtol`             | 0.01             | of the solver; it keeps the angle within 0.03 deg                        |
     | `render_mode`      | `None`           | `"human"` or `"rgb_array"`                                               |
 
     `readings()` gives every sensor of the model without noise. A pickled environment keeps settings and generator, and
@@ -132,7 +130,7 @@ class ElbowLiftEnv(gymnasium.Env):
     * v0: first version
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
     def __init__(
         self,
@@ -160,15 +158,15 @@ class ElbowLiftEnv(gymnasium.Env):
             ("episode_duration", episode_duration, 0.1, 120.0),
             ("rtol", rtol, 1e-8, 5e-2),
         ):
-            if not low <= value <= high:
+            if not within(value, low, high):
                 raise InputError(f"{name} = {value!r}; a number from {low:g} to {high:g} is wanted.")
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": round(control_rate)}
         self.period, self.duration = 1.0 / control_rate, float(episode_duration)
         self.population = population(patient)
-        self.load = _load(load)
+        self.load = load_distribution(load)
         self.repetitions = Repetitions.of(reference)
-        self.ecosystem = Ecosystem(device=_device(exoskeleton))
+        self.ecosystem = Ecosystem(device=worn_device(exoskeleton))
         self.action_mode, self.drive = action_mode, drive(action_mode, dict(drive_settings or {}))
         self.weights, self.limits = rewards.Weights(**(reward_weights or {})), Limits(**(limits or {}))
         self.solver = SolverOptions(rtol=rtol, h_min=SMALLEST_STEP, max_steps=MOST_STEPS)
@@ -205,12 +203,8 @@ class ElbowLiftEnv(gymnasium.Env):
             InputError: an option is unknown or not usable.
         """
         super().reset(seed=seed)
-        options = options or {}
-        for name in options:
-            if name not in OPTIONS:
-                raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
         self._over, self._episode = True, None
-        self._begin(options)
+        self._begin(options or {})
         self._over = False
         self._readout.update(0)
         observation = self.observer.observe(self._readout.channels(self._action), self.np_random, first=True)
@@ -220,7 +214,10 @@ class ElbowLiftEnv(gymnasium.Env):
         return observation.copy(), self._start_info()
 
     def _begin(self, options: Mapping[str, Any]) -> None:
-        """Draw an episode; two generators of the same draws keep what is fixed from shifting what is not."""
+        """Draw an episode; what is fixed draws from a generator of its own, so as not to shift what is not."""
+        for name in options:
+            if name not in OPTIONS:
+                raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
         patients, loads, repetitions = self.population, self.load, self.repetitions
         patient = patients.sample(self.np_random)
         load = float(loads.quantile(self.np_random.random()))
@@ -230,12 +227,12 @@ class ElbowLiftEnv(gymnasium.Env):
         if "patient" in options:
             patient = population(options["patient"]).sample(fixed)
         if "load" in options:
-            load = float(_load(options["load"]).quantile(fixed.random()))
+            load = float(load_distribution(options["load"]).quantile(fixed.random()))
         if "reference" in options:
             repetition = Repetitions.of(options["reference"]).sample(fixed)
         start_deg = options.get("initial_angle_deg", repetition.start_deg)
-        if not self.limits.lowest_deg <= start_deg <= self.limits.highest_deg:
-            low, high = self.limits.lowest_deg, self.limits.highest_deg
+        low, high = self.limits.lowest_deg, self.limits.highest_deg
+        if not within(start_deg, low, high):
             raise InputError(f"initial_angle_deg = {start_deg!r}; a number from {low:g} to {high:g} is wanted.")
         self._episode = self._simulated(patient, load, repetition, math.radians(start_deg))
         self._step = 0
@@ -349,9 +346,7 @@ class ElbowLiftEnv(gymnasium.Env):
     def _label(self) -> str:
         """Names the patient in a picture."""
         p = self.episode.patient
-        title = self.population.title or "patient"
-        flexors, extensors = p.maximum_activation_flexors, p.maximum_activation_extensors
-        return f"{title}: flexors {flexors:.0%}, extensors {extensors:.0%}"
+        return f"flexors {p.maximum_activation_flexors:.0%}, extensors {p.maximum_activation_extensors:.0%}"
 
     def render(self) -> np.ndarray | None:
         """The arm from the side: an array of shape (480, 480, 3) in mode 'rgb_array', a window in mode 'human'."""
@@ -361,7 +356,8 @@ class ElbowLiftEnv(gymnasium.Env):
         if self._renderer is None:
             from exo_env.rendering import Renderer
 
-            self._renderer = Renderer(self.render_mode, fps=self.metadata["render_fps"])
+            mode: Any = self.render_mode
+            self._renderer = Renderer(mode, fps=self.metadata["render_fps"])
         return self._renderer.draw(self.scene())
 
     def close(self) -> None:
@@ -377,25 +373,3 @@ class ElbowLiftEnv(gymnasium.Env):
     def __setstate__(self, state: dict[str, Any]) -> None:
         type(self).__init__(self, **state["settings"])
         self._np_random, self._np_random_seed = state["generator"], state["seed"]
-
-
-def _load(load: float | Mapping[str, Any] | None) -> Any:
-    """Distribution of the weight on the machine [kg]."""
-    spec = {"uniform": [0.5, 2.0]} if load is None else load
-    try:
-        found = distribution(spec)
-        if any(isinstance(x, str) or not 0.05 <= x <= 50.0 for x in found.limits()):
-            raise InputError("numbers from 0.05 to 50 kg are wanted.")
-    except InputError as error:
-        raise InputError(f"load = {load!r}: {error}") from None
-    return found
-
-
-def _device(source: str | Mapping[str, Any] | None) -> Exoskeleton:
-    """A shipped device by name, or the default with some values changed."""
-    shipped = sorted(p.stem for p in (configs() / "exoskeletons").glob("*.yaml"))
-    if source is None or isinstance(source, Mapping):
-        return Exoskeleton.from_config("exoskeletons/elbow.yaml").changed(**(source or {}))
-    if source not in shipped:
-        raise InputError(f"exoskeleton = {source!r}; a mapping or one of {choices(shipped)} is wanted.")
-    return Exoskeleton.from_config(f"exoskeletons/{source}.yaml")

@@ -14,7 +14,7 @@
                  Elbow reaction above that of quiet lifting, which pulling against oneself causes; assumed.
     unsafe       -1 once, where an event ends the episode, see events.py
 
-With the default weights a second of good tracking is worth 50, a second of 10 Nm of help costs 10, and an unsafe event
+With the default weights a second of good tracking is worth 50, a second of 10 Nm of help costs 25, and an unsafe event
 100: two seconds of tracking beside what is lost by the end of the episode. The weights are assumed.
 """
 
@@ -37,7 +37,7 @@ class Weights(Settings):
     """Factor on each term."""
 
     tracking: float = Field(default=1.0, ge=0.0, le=1e6)
-    assistance: float = Field(default=0.2, ge=0.0, le=1e6)
+    assistance: float = Field(default=0.5, ge=0.0, le=1e6)
     smoothness: float = Field(default=0.2, ge=0.0, le=1e6)
     reaction: float = Field(default=0.2, ge=0.0, le=1e6)
     unsafe: float = Field(default=100.0, ge=0.0, le=1e6)

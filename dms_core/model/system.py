@@ -81,7 +81,7 @@ class System:
         """The body of that name, None for 'ground'; an unknown name is an error that lists the bodies."""
         if name == GROUND:
             return None
-        if name not in {b.name for b in self.bodies}:
+        if not isinstance(self._by_name.get(name), Body):
             names = [GROUND, *(b.name for b in self.bodies)]
             raise ModelError(f"body '{name}' does not exist. Declared: {choices(names)}.")
         return self._by_name[name]  # type: ignore[return-value]

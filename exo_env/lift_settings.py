@@ -1,0 +1,43 @@
+"""Settings of the environment from what a user may give."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dms_core.config_files import configs
+from dms_core.errors import InputError, choices
+from exo_env.distributions import Distribution, distribution
+from exo_env.exoskeleton import Exoskeleton
+
+LEAST_LOAD, MOST_LOAD = 0.05, 50.0
+"""Weights that the machine takes [kg]."""
+
+
+def within(value: Any, low: float, high: float) -> bool:
+    """Whether a value is a number between two limits."""
+    return isinstance(value, int | float | np.number) and bool(low <= value <= high)
+
+
+def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:
+    """Distribution of the weight on the machine [kg]."""
+    spec = {"uniform": [0.5, 2.0]} if load is None else load
+    try:
+        found = distribution(spec)
+        if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in found.limits()):
+            raise InputError(f"numbers from {LEAST_LOAD} to {MOST_LOAD} kg are wanted.")
+    except InputError as error:
+        raise InputError(f"load = {load!r}: {error}") from None
+    return found
+
+
+def worn_device(source: str | Mapping[str, Any] | None) -> Exoskeleton:
+    """A shipped device by name, or the default with some values changed."""
+    shipped = sorted(p.stem for p in (configs() / "exoskeletons").glob("*.yaml"))
+    if source is None or isinstance(source, Mapping):
+        return Exoskeleton.from_config("exoskeletons/elbow.yaml").changed(**(source or {}))
+    if source not in shipped:
+        raise InputError(f"exoskeleton = {source!r}; a mapping or one of {choices(shipped)} is wanted.")
+    return Exoskeleton.from_config(f"exoskeletons/{source}.yaml")

@@ -1,0 +1,128 @@
+"""The environment as Gymnasium wants it: checker, spec, seeds, pickles, vector environments, wrappers."""
+
+import json
+import pickle
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import RecordEpisodeStatistics
+
+ID = "exo/ElbowLift-v0"
+ACTION = np.array([-0.4, -0.9], np.float32)
+
+
+@pytest.mark.parametrize("mode", ["rope_tension", "pid_setpoint"])
+@pytest.mark.parametrize("groups", [["device"], ["privileged", "emg", "device"]])
+def test_checker_finds_nothing(make, mode, groups):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Pictures have tests of their own.
+        check_env(make(action_mode=mode, observation=groups).unwrapped, skip_render_check=True)
+
+
+def test_spec_goes_through_json(make):
+    settings = {
+        "patient": {"base": "healthy", "fields": {"strength": {"uniform": [0.8, 1.0]}}},
+        "load": {"choice": [0.5, 1.0]},
+        "reference": {"duration": 1.8},
+        "noise": {"angle": {"deviation": 0.01}},
+        "reward_weights": {"tracking": 2.0},
+        "control_rate": 100.0,
+    }
+    spec = EnvSpec.from_json(make(**settings).spec.to_json())
+    assert spec.kwargs == json.loads(json.dumps(settings))
+    one, other = gymnasium.make(spec), make(**settings)
+    np.testing.assert_array_equal(one.reset(seed=3)[0], other.reset(seed=3)[0])
+    assert one.unwrapped.period == 0.01
+
+
+RUN = """
+import numpy as np, gymnasium, exo_env, sys
+env = gymnasium.make("exo/ElbowLift-v0", observation=["device", "emg", "privileged"]).unwrapped
+{before}
+found = [env.reset(seed=int(sys.argv[1]))[0]]
+for k in range(30):
+    o, r, *_ = env.step(np.array([-0.4 + 0.01 * k, -0.9]))
+    found += [o, [r]]
+print(np.concatenate(found).astype(np.float64).tobytes().hex())
+"""
+
+
+def _bits(seed, before=""):
+    done = subprocess.run(
+        [sys.executable, "-c", RUN.format(before=before), str(seed)], capture_output=True, text=True, check=True
+    )
+    return done.stdout
+
+
+def test_a_seed_gives_the_same_bits_in_every_process():
+    first = _bits(7)
+    # What was simulated before must not matter.
+    assert first == _bits(7, "env.reset(seed=1); env.step(np.zeros(2))")
+    assert first != _bits(8)
+
+
+def test_other_seeds_are_other_patients(env):
+    patients = [env.reset(seed=k)[1]["patient"]["body_mass"] for k in range(5)]
+    assert len(set(patients)) == 5
+    assert env.reset(seed=2)[1]["patient"]["body_mass"] == patients[2]
+
+
+def test_without_a_seed_the_generator_goes_on(env):
+    env.reset(seed=2)
+    second = env.reset()[1]
+    env.reset(seed=2)
+    assert second == env.reset()[1]
+
+
+def test_a_pickled_environment_goes_on_with_its_generator(make):
+    env = make(patient="healthy", observation=["device", "emg"]).unwrapped
+    env.reset(seed=5)
+    twin = pickle.loads(pickle.dumps(env))
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        twin.step(ACTION)
+    (a, one), (b, other) = env.reset(), twin.reset()
+    np.testing.assert_array_equal(a, b)
+    assert one == other and twin.observation_space == env.observation_space
+
+
+@pytest.mark.parametrize("vector", [gymnasium.vector.SyncVectorEnv, gymnasium.vector.AsyncVectorEnv])
+def test_vector_environments(make, vector):
+    envs = vector([lambda: gymnasium.make("exo_env:" + ID) for _ in range(2)])
+    try:
+        found, _ = envs.reset(seed=[4, 5])
+        alone = make()
+        np.testing.assert_array_equal(found[1], alone.reset(seed=5)[0])
+        for _ in range(3):
+            found, rewards, *_ = envs.step(np.stack([ACTION, ACTION]))
+            single, reward, *_ = alone.step(ACTION)
+        np.testing.assert_array_equal(found[1], single)
+        assert rewards[1] == reward
+    finally:
+        envs.close()
+
+
+def test_episode_statistics(make):
+    env = RecordEpisodeStatistics(make(action_mode="pid_setpoint", episode_duration=0.2))
+    env.reset(seed=0)
+    rewards, over, info = [], False, {}
+    while not over:
+        _, reward, terminated, truncated, info = env.step(np.zeros(2, np.float32))
+        rewards.append(reward)
+        over = terminated or truncated
+    assert info["episode"]["l"] == len(rewards) == 10
+    assert info["episode"]["r"] == pytest.approx(sum(rewards))
+
+
+def test_memory_is_not_shared(env):
+    first, info = env.reset(seed=0)
+    kept = first.copy()
+    after = env.step(ACTION)[0]
+    np.testing.assert_array_equal(first, kept)
+    assert not np.shares_memory(first, after)

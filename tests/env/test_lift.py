@@ -1,0 +1,259 @@
+"""What the environment does: options, drives, observations, rewards, events, long runs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from dms_core.results import Result
+from exo_env.actions import RopeTension
+from exo_env.lift_env import ElbowLiftEnv
+from exo_env.observations import Observer
+from exo_env.readout import device_share
+from exo_env.repetition import Repetition
+from exo_env.rewards import Weights, terms, total
+from exo_env.soak import soak
+
+LIMP = {"maximum_activation_flexors": 0.0, "maximum_activation_extensors": 0.0}
+HOLD = np.array([-1.0, -1.0])
+
+
+def _part(env, observation, name):
+    s = next(s for s in env.observation_structure if s.name == name)
+    return observation[s.start : s.stop] * s.scale
+
+
+def test_options_fix_what_they_name_and_nothing_else(env):
+    _, free = env.reset(seed=9)
+    _, heavy = env.reset(seed=9, options={"load": 3.0})
+    assert heavy["load"] == 3.0
+    assert heavy["patient"] == free["patient"] and heavy["reference"] == free["reference"]
+    wanted = {"start_deg": 30.0, "amplitude_deg": 50.0, "rest": 0.4, "duration": 2.0, "pause": 0.5}
+    _, fixed = env.reset(seed=9, options={"patient": {"strength": 0.7}, "reference": wanted, "initial_angle_deg": 40.0})
+    assert fixed["patient"]["strength"] == 0.7 and fixed["patient"]["maximum_activation_flexors"] == 1.0
+    assert fixed["reference"] == wanted and fixed["load"] == free["load"]
+    assert fixed["initial_angle_deg"] == pytest.approx(40.0, abs=1e-6)
+
+
+def test_repetition_reaches_its_angles():
+    r = Repetition(start_deg=30.0, amplitude_deg=60.0, rest=0.5, duration=2.0, pause=1.0)
+    course = r.course(np.array([0.0, 0.5, 1.5, 2.5, 3.5, 5.5, 6.0]))
+    np.testing.assert_allclose(np.degrees(course[:, 0]), [30, 30, 60, 90, 90, 30, 30], atol=1e-9)
+    # Flash and Hogan 1985: the largest rate of a minimum-jerk move is 1.875 times the mean.
+    assert course[2, 1] == pytest.approx(1.875 * math.radians(60.0) / 2.0)
+    np.testing.assert_allclose(course[[0, 1, 3, 4, 6], 1:], 0.0, atol=1e-9)
+
+
+def test_the_arm_rests_at_the_start(env):
+    """Muscles and agonist hold it, whoever the patient is; the handle, which the estimate takes as a point, swings."""
+    for seed in range(5):
+        env.reset(seed=seed)
+        # 0.03 to 0.09 rad/s^2 were measured; without the rope a limp arm falls with 10.
+        assert abs(env.readings()["elbow_angle.acceleration"]) < 0.3
+
+
+def test_tension_follows_with_rate_limit_and_lag():
+    env = ElbowLiftEnv(patient={}, limits={"lowest_deg": -10.0})
+    env.reset(seed=0, options={"load": 1.0})
+    drive, period = RopeTension(), 0.02
+    found, held = env.readings()["antagonist_tension"], 0.0
+    assert found == 0.0
+    for _ in range(4):
+        env.step(np.array([-0.6, 0.5]))
+        held = min(held + drive.rate_limit * period, 75.0)
+        found = held + (found - held) * math.exp(-period / drive.time_constant)
+        # The lag's exact answer to a held command; rtol 1e-2 of 100 N nominal allows an error of 0.1 N a step or so.
+        assert env.readings()["antagonist_tension"] == pytest.approx(found, abs=1.0)
+
+
+def test_setpoint_goes_through_the_filter():
+    env = ElbowLiftEnv(action_mode="pid_setpoint", patient=LIMP, rtol=1e-4, reference={"rest": 5.0}, load=1.0)
+    env.reset(seed=0)
+    w, errors = 20.0, []
+    for k in range(1, 31):
+        env.step(np.array([1.0, 1.0]))
+        t = 0.02 * k
+        wanted = 0.2 * (1.0 - (1.0 + w * t) * math.exp(-w * t))
+        r = env.readings()
+        # The Tracking sensor's error is reference + filtered setpoint - hinge angle.
+        assert r["tracking.error"] + r["exo_angle.angle"] - r["reference"] == pytest.approx(wanted, abs=1e-4)
+        errors.append(r["tracking.error"])
+    # The PID brings a limp arm to the shifted setpoint: 200 N/0.01 rad is in reach of its gain of 8845 N/rad.
+    assert abs(errors[-1]) < 0.02
+
+
+def test_authority_zero_leaves_the_ropes_slack():
+    env = ElbowLiftEnv(action_mode="pid_setpoint", patient={}, load=1.0)
+    env.reset(seed=0)
+    for _ in range(10):
+        env.step(np.array([0.0, -1.0]))
+    r = env.readings()
+    # What is left is the smoothing of the positive part, 3 w / 32 = 0.094 N in each rope.
+    assert r["assistance"] == 0.0 and max(r["agonist_tension"], r["antagonist_tension"]) < 0.2
+
+
+@pytest.mark.parametrize("noise", [False])
+def test_observations_are_the_readings(noise):
+    env = ElbowLiftEnv(observation=["device", "emg", "privileged"], noise=noise)
+    env.reset(seed=3)
+    for _ in range(5):
+        observation, *_ = env.step(np.array([-0.3, -0.8]))
+    r, p = env.readings(), env.episode.patient
+    close = {"rel": 1e-6, "abs": 1e-6}  # float32
+    assert _part(env, observation, "angle") == pytest.approx([r["exo_angle.angle"]], **close)
+    assert _part(env, observation, "tension") == pytest.approx([r["agonist_tension"], r["antagonist_tension"]], **close)
+    assert _part(env, observation, "reference") == pytest.approx([r["reference"]], **close)
+    assert _part(env, observation, "last_action") == pytest.approx([-0.3, -0.8], **close)
+    assert _part(env, observation, "emg")[3] == pytest.approx(r["BIClong.sensor.activation"], **close)
+    assert _part(env, observation, "muscle_force")[5] == pytest.approx(r["BRA.sensor.tendon_force"], **close)
+    assert _part(env, observation, "neural_delay") == pytest.approx([p.neural_delay], **close)
+    ahead = env.episode.repetition.course(np.array([0.2, 0.3, 0.5]))[:, 0]
+    assert _part(env, observation, "preview") == pytest.approx(ahead, **close)
+    force = math.sqrt(sum(r[f"guide_force.F{x}"] ** 2 for x in "xyz"))
+    # A plane guide has a force along its normal only.
+    assert abs(_part(env, observation, "guide_force")[0]) == pytest.approx(force, rel=1e-5)
+
+
+def test_noise_delay_and_quantisation():
+    reading = {"angle": 1.0, "rate": 0.0, "tension": [1.0, 2.0], "guide_force": 0.0, "reference": 0.0,
+               "reference_rate": 0.0, "preview": [0.0] * 3, "last_action": [0.0, 0.0]}  # fmt: skip
+    spec = {"angle": {"delay": 0.03}, "rate": {"quantum": 0.25}, "guide_force": {"deviation": 2.0}}
+    observer, generator = Observer(["device"], spec, 0.02), np.random.default_rng(0)
+    observer.observe(reading, generator, first=True)
+    rows = [
+        observer.observe(reading | {"angle": 1.0 + k, "rate": 0.1 + 0.1 * k}, generator, first=False) for k in (1, 2, 3)
+    ]
+    # 1.5 periods late, between two samples; the range ends at 3.
+    np.testing.assert_allclose([row[0] for row in rows], [1.0, 1.5, 2.5])
+    np.testing.assert_allclose([row[1] for row in rows], [0.25, 0.25, 0.5])
+    many = np.array([observer.observe(reading, generator, first=False)[4] * 10.0 for _ in range(4000)])
+    # Standard error of a deviation from 4000 numbers: 2 / sqrt(8000) = 0.022; four of them.
+    assert many.std() == pytest.approx(2.0, abs=0.09) and abs(many.mean()) < 0.13
+
+
+def test_reward_is_the_sum_of_its_terms(env):
+    env.reset(seed=1)
+    _, reward, _, _, info = env.step(np.array([-0.5, -0.9]))
+    weights, found = info["reward_weights"], info["reward_terms"]
+    assert reward == pytest.approx(sum(weights[k] * found[k] for k in weights))
+    assert found["tracking"] == pytest.approx(math.exp(-((info["tracking_error_deg"] / 10.0) ** 2)))
+    assert found["smoothness"] == pytest.approx(-(0.5**2 + 0.9**2) / 8.0)
+
+
+def test_terms():
+    quiet = {"error": 0.0, "moment": 0.0, "reaction": 400.0, "action": HOLD, "before": HOLD, "unsafe": False}
+    assert total(terms(**quiet), Weights()) == 1.0
+    assert terms(**(quiet | {"moment": -5.0}))["assistance"] == -0.5
+    assert terms(**(quiet | {"moment": 1e3}))["assistance"] == -2.0
+    assert terms(**(quiet | {"reaction": 750.0}))["reaction"] == -0.5
+    assert terms(**(quiet | {"before": -HOLD}))["smoothness"] == -1.0
+    assert terms(**(quiet | {"unsafe": True}))["unsafe"] == -1.0
+    assert terms(**(quiet | {"error": math.radians(10.0)}))["tracking"] == pytest.approx(math.exp(-1.0))
+
+
+def test_share():
+    assert device_share(3.0, 1.0) == 0.25 and device_share(-3.0, -1.0) == 0.25
+    assert device_share(5.0, -1.0) == 0.0 and device_share(-1.0, 5.0) == 1.0 and device_share(0.0, 0.0) == 0.0
+
+
+def test_an_arm_pulled_straight_ends_the_episode():
+    env = ElbowLiftEnv(patient=LIMP, load=1.0)
+    env.reset(seed=0)
+    for _ in range(100):
+        _, reward, terminated, truncated, info = env.step(np.array([-1.0, 1.0]))
+        if terminated:
+            break
+    assert terminated and not truncated and "outside 0 to 142 deg" in info["event"]
+    assert info["reward_terms"]["unsafe"] == -1.0 and reward < -99.0 and not info["solver_failed"]
+
+
+def test_a_limp_arm_without_help_hangs_without_falling_through():
+    """The cable of the machine pulls forward: at rest it is bent by 10 degrees, within the limits."""
+    env = ElbowLiftEnv(patient=LIMP, load=1.0)
+    env.reset(seed=0)
+    for _ in range(120):
+        *_, terminated, _, _ = env.step(HOLD)
+        assert not terminated
+    r = env.readings()
+    assert math.degrees(r["elbow_angle.angle"]) == pytest.approx(10.3, abs=0.5)
+    # Nothing moves, so the weight hangs on its rope: 1 kg of arm26's own gravity.
+    assert r["gym_rope_tension"] == pytest.approx(9.8066, abs=1e-3)
+
+
+@pytest.mark.parametrize(("limits", "word"), [({"tension": 100.0}, "rope"), ({"reaction": 150.0}, "reaction force")])
+def test_limits_end_an_episode(limits, word):
+    env = ElbowLiftEnv(patient={}, load=1.0, limits=limits)
+    env.reset(seed=0)
+    for _ in range(30):
+        _, _, terminated, _, info = env.step(np.array([0.5, 0.3]))
+        if terminated:
+            break
+    assert terminated and word in info["event"]
+
+
+def test_a_failed_solver_ends_the_episode_with_its_sentence(env):
+    env.reset(seed=0)
+    before, *_ = env.step(HOLD)
+    world = env.episode.world
+    world._numbers = world._numbers._replace(max_steps=1)
+    observation, reward, terminated, _, info = env.step(HOLD)
+    assert terminated and info["solver_failed"] and Result.TOO_MANY_STEPS.value in info["event"]
+    np.testing.assert_array_equal(observation, before)
+    assert math.isfinite(reward)
+
+
+def test_effort_falls_where_the_device_does_the_work():
+    slack = {"slacking_rate": 3.0, "least_effort": 0.2}
+    env = ElbowLiftEnv(action_mode="pid_setpoint", patient=slack, load=1.0)
+    efforts = {}
+    for authority in (-1.0, 1.0):
+        env.reset(seed=0)
+        for _ in range(150):
+            *_, info = env.step(np.array([0.0, authority]))
+        efforts[authority] = info["effort"]
+    assert efforts[1.0] < 0.8 * efforts[-1.0]
+
+
+def test_readings_hold_what_the_figures_show(env):
+    env.reset(seed=0)
+    env.step(HOLD)
+    r, units = env.readings(), env.reading_units()
+    for name in ("elbow_angle.angle", "reference", "BIClong.sensor.tendon_force", "TRIlong.sensor.tendon_force",
+                 "agonist_tension", "antagonist_tension", "muscle_moment", "exo_moment", "elbow_reaction.Fx",
+                 "elbow_reaction.Mz", "guide_force.Fx", "gym_rope_tension"):  # fmt: skip
+        assert math.isfinite(r[name])
+    assert units["agonist_tension"] == "N" and units["exo_moment"] == "Nm"
+
+
+def test_default_tolerance_is_finer_than_the_encoder():
+    """rtol 1e-2 against 1e-5 under the same rough actions: within a fifth of the encoder's step of 0.0015 rad."""
+    angles = []
+    for rtol in (1e-2, 1e-5):
+        env, actions = ElbowLiftEnv(rtol=rtol, patient="stroke_mild"), np.random.default_rng(0)
+        env.reset(seed=11, options={"load": 1.0})
+        angles.append([])
+        for _ in range(40):
+            env.step(np.array([-0.5, -0.9]) + actions.uniform(-0.1, 0.1, 2))
+            angles[-1].append(env.readings()["elbow_angle.angle"])
+    # 2.4e-4 rad was measured over 250 periods.
+    np.testing.assert_allclose(angles[0], angles[1], atol=3e-4)
+
+
+@pytest.mark.parametrize(("mode", "steps"), [("rope_tension", 1500), ("pid_setpoint", 500)])
+def test_random_actions_over_the_evaluation_population(mode, steps):
+    found = soak(steps, action_mode=mode)
+    assert found["not_finite_or_outside"] == 0 and found["failed_solves"] == 0
+    assert found["largest_phi"] < 1e-8
+    assert sum(found["ends"].values()) == found["episodes"]
+
+
+def test_scene(env):
+    env.reset(seed=0)
+    env.step(HOLD)
+    scene, r = env.scene(), env.readings()
+    assert scene.time == pytest.approx(0.02) and scene.elbow_angle == r["elbow_angle.angle"]
+    assert len(scene.muscles) == 6 and len(scene.ropes) == 2 and scene.ropes[0][1] == r["agonist_tension"]
+    forearm = np.linalg.norm(scene.grip - scene.elbow)
+    assert 0.25 < forearm < 0.42
+    # The weight hangs under the high pulley.
+    assert scene.weight[0] == pytest.approx(scene.pulleys[1][0], abs=1e-9)
