@@ -9,7 +9,8 @@ are a constant moment. The first part of dw/dt learns what the patient lacks; th
 forgets: it lowers Y w, and nothing else, with the time constant `memory`, so that the patient has to take over. Weights
 begin with the moment of the agonist at the start. Moments become tensions by the moment arms of the device.
 
-Gains are ours, chosen by the return among ten tried on the training population ('mixed', 8 patients, seed 100).
+Gains are ours. On the training population ('mixed', 8 patients, seed 100) stiffer control or faster learning tracks
+better and returns 1 % more, and makes the device less compliant, which is what their paper is about.
 """
 
 from __future__ import annotations
