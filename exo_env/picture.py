@@ -1,0 +1,235 @@
+"""Draws a scene: the arm from the side with its muscles, the device and the reference; the gym machine as an inset.
+
+The subject looks to the right, and the viewer stands at the subject's right hand. The main view is tied to the upper
+arm, which rests, and is as large as it, so that the picture holds still and small and tall persons fill it alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from exo_env.canvas import FINER, Box, Canvas, Colour
+from exo_env.scene import Scene
+from exo_env.shapes import dashes, limb, spindle
+
+PAPER, CARD, FRAME = (255, 255, 255), (249, 250, 251), (212, 216, 222)
+INK, GREY = (33, 37, 43), (112, 119, 129)
+TORSO = (236, 239, 242)
+SKIN, SKIN_EDGE = (245, 228, 214), (205, 178, 158)
+STEEL, STEEL_EDGE, STEEL_LIGHT = (112, 124, 140), (58, 66, 78), (236, 239, 243)
+ROPE, IRON = (92, 98, 108), (66, 72, 82)
+REFERENCE = (0, 140, 105)
+ACTIVATION: tuple[Colour, ...] = ((36, 88, 200), (146, 66, 158), (220, 28, 40))
+"""Of muscles, from activation 0 to 1: blue, purple, red."""
+TENSION: tuple[Colour, ...] = ((196, 200, 206), (244, 180, 48), (190, 72, 0))
+"""Of the device's ropes, from slack to the largest tension: grey, yellow, brown."""
+WINDOW = 2.8
+"""Side of the main view over the length of the upper arm [-]."""
+ELBOW_AT = (0.27, 0.47)
+"""Place of the elbow in the main view, as shares of its side from the left and from the top."""
+READINGS: Box = (334, 10, 136, 92)
+INSET: Box = (352, 296, 118, 174)
+SCALES: Box = (10, 414, 172, 56)
+
+
+def gradient(colours: Sequence[Colour], share: float) -> Colour:
+    """The colour at a share of a scale, 0 to 1."""
+    x = min(max(float(share), 0.0), 1.0) * (len(colours) - 1)
+    k = min(int(x), len(colours) - 2)
+    red, green, blue = (round(a + (x - k) * (b - a)) for a, b in zip(colours[k], colours[k + 1], strict=True))
+    return red, green, blue
+
+
+def darker(colour: Colour) -> Colour:
+    """For the edge of a shape."""
+    red, green, blue = colour
+    return 11 * red // 20, 11 * green // 20, 11 * blue // 20
+
+
+def tension_share(tension: float, largest: float) -> float:
+    """Place on the scale of tensions, 0 to 1: the square root, so that a tenth of the largest is well seen."""
+    return float(np.sqrt(min(max(tension / largest, 0.0), 1.0)))
+
+
+class View(NamedTuple):
+    """Maps metres to fine pixels."""
+
+    scale: float
+    """[fine pixel/m]"""
+    x: float
+    """Of the left edge of the canvas [m]."""
+    y: float
+    """Of its upper edge [m]."""
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Points [m] in fine pixels, same shape."""
+        return (np.asarray(points, dtype=float) - (self.x, self.y)) * (self.scale, -self.scale)
+
+
+class Picture:
+    """Draws scenes on a canvas."""
+
+    def __init__(self, canvas: Canvas) -> None:
+        self.canvas = canvas
+
+    def draw(self, scene: Scene) -> None:
+        """Draw a scene over the last one."""
+        self.canvas.clear(PAPER)
+        upper_arm = float(np.hypot(*(np.asarray(scene.shoulder) - scene.elbow)))
+        side = WINDOW * upper_arm
+        view = View(
+            FINER * self.canvas.size / side,
+            scene.elbow[0] - ELBOW_AT[0] * side,
+            scene.elbow[1] + ELBOW_AT[1] * side,
+        )
+        self._torso(view, scene, upper_arm)
+        if scene.gym_rope is not None:
+            self._handle(view, scene, scene.gym_rope)
+        self._arm(view, scene, upper_arm)
+        self._ghost(view, scene, upper_arm)
+        for points, activation in scene.muscles:
+            self._muscle(view(points), activation)
+        self._device(view, scene)
+        for box in (READINGS, SCALES):
+            self.canvas.box(box, CARD, border=FRAME, round_by=5)
+        self._bars()
+        if scene.gym_rope is not None:
+            weight_at = self._machine(scene, scene.gym_rope)
+        self.canvas.smooth()
+        self._readings(scene)
+        self._scale_words(scene)
+        if scene.gym_rope is not None and scene.weight_mass is not None:
+            self.canvas.words(f"{scene.weight_mass:.3g} kg", weight_at, INK, "small", "centre")
+
+    # The subject
+
+    def _torso(self, view: View, scene: Scene, upper_arm: float) -> None:
+        """Trunk and neck behind the arm, as far as the picture shows them."""
+        s, r = scene.shoulder, view.scale * upper_arm
+        chest = s + np.array((-0.17, -0.24)) * upper_arm
+        for end, a, b in (((-0.10, 0.9), 0.17, 0.15), ((-0.20, -2.6), 0.42, 0.36)):
+            self.canvas.polygon(limb(view(chest), view(s + np.array(end) * upper_arm), a * r, b * r), TORSO)
+
+    def _arm(self, view: View, scene: Scene, upper_arm: float) -> None:
+        """Upper arm, forearm and hand."""
+        r = view.scale * upper_arm
+        shoulder, elbow, grip = view(scene.shoulder), view(scene.elbow), view(scene.grip)
+        wrist = elbow + 0.80 * (grip - elbow)
+        parts = [
+            limb(shoulder, elbow, 0.22 * r, 0.15 * r),
+            limb(elbow, wrist, 0.15 * r, 0.085 * r),
+            limb(wrist, grip, 0.085 * r, 0.125 * r),
+        ]
+        for outline in parts:
+            self.canvas.polygon(outline, SKIN, SKIN_EDGE, 1.4)
+        for outline in parts:
+            self.canvas.polygon(outline, SKIN)
+
+    def _ghost(self, view: View, scene: Scene, upper_arm: float) -> None:
+        """The forearm where the reference wants it; its turn is drawn as if the elbow axis faced the viewer."""
+        r = view.scale * upper_arm
+        turn = scene.reference_angle - scene.elbow_angle
+        c, s = np.cos(turn), np.sin(turn)
+        grip = scene.elbow + np.array([[c, -s], [s, c]]) @ (np.asarray(scene.grip) - scene.elbow)
+        outline = limb(view(scene.elbow), view(grip), 0.17 * r, 0.145 * r)
+        self.canvas.veil(outline, REFERENCE, 0.13)
+        for dash in dashes(outline, 5.0 * self.canvas.unit):
+            self.canvas.line(dash, REFERENCE, 1.5)
+
+    def _muscle(self, points: np.ndarray, activation: float) -> None:
+        """A spindle that swells with activation."""
+        colour = gradient(ACTIVATION, activation)
+        belly = (8.0 + 5.0 * activation) * self.canvas.unit
+        self.canvas.polygon(spindle(points, belly, 0.35 * belly), colour, darker(colour), 0.7)
+
+    # Device and machine
+
+    def _device(self, view: View, scene: Scene) -> None:
+        """Links, horns of the ropes, ropes, hinge."""
+        bars = [(view(link), 7.0) for link in scene.exo_links]
+        hinge = bars[0][0][-1] if bars else view(scene.elbow)
+        bars += [(np.array([hinge, view(points)[-1]]), 4.0) for points, _, _ in scene.ropes]
+        for points, width in bars:
+            self.canvas.line(points, STEEL_EDGE, width + 2.0)
+        for points, width in bars:
+            self.canvas.line(points, STEEL, width)
+        for points, tension, largest in scene.ropes:
+            share = tension_share(tension, largest)
+            colour, width = gradient(TENSION, share), 1.8 + 3.0 * share
+            self.canvas.line(view(points), darker(colour), width + 1.2)
+            self.canvas.line(view(points), colour, width)
+            for end in (view(points)[0], view(points)[-1]):
+                self._pin(end, 3.2)
+        if bars:
+            self._pin(hinge, 8.5)
+
+    def _pin(self, centre: np.ndarray, radius: float) -> None:
+        """A hinge seen along its axis."""
+        self.canvas.disc(centre, radius, STEEL_EDGE)
+        self.canvas.disc(centre, 0.80 * radius, STEEL_LIGHT)
+        self.canvas.disc(centre, 0.32 * radius, STEEL_EDGE)
+
+    def _handle(self, view: View, scene: Scene, rope: np.ndarray) -> None:
+        """The handle in the hand and the rope that leaves the picture."""
+        self.canvas.line(view(rope[:2]), ROPE, 2.0)
+        self.canvas.line(np.array([view(scene.grip), view(rope[0])]), IRON, 5.0)
+        self.canvas.disc(view(rope[0]), 3.4, IRON)
+
+    def _machine(self, scene: Scene, rope: np.ndarray) -> tuple[float, float]:
+        """The whole machine with the arm as two strokes; returns where the mass is written, in the layout."""
+        x, y, width, height = INSET
+        fixed = np.array([*scene.pulleys, scene.shoulder, scene.elbow])
+        low, high = fixed.min(axis=0), fixed.max(axis=0)
+        unit = self.canvas.unit
+        scale = unit * min((width - 40) / (high[0] - low[0]), (height - 40) / (high[1] - low[1]))
+        middle = 0.5 * (low + high)
+        view = View(scale, middle[0] - unit * (x + 0.5 * width) / scale, middle[1] + unit * (y + 0.5 * height) / scale)
+        self.canvas.box(INSET, CARD, border=FRAME, round_by=5)
+        with self.canvas.inside((x + 1, y + 1, width - 2, height - 2)):
+            self.canvas.line(view(np.array([scene.shoulder, scene.elbow, scene.grip])), SKIN_EDGE, 6.0)
+            self.canvas.line(view(np.array([scene.grip, rope[0]])), IRON, 2.5)
+            self.canvas.line(view(rope), ROPE, 1.4)
+            for pulley in scene.pulleys:
+                self._pin(view(pulley), 5.0)
+            end = rope[-1] if scene.weight is None else scene.weight
+            centre = view(end) / unit
+            self.canvas.box((centre[0] - 11, centre[1] - 8, 22, 16), IRON, round_by=2.5)
+        return float(centre[0]), float(centre[1]) + 11.0
+
+    # Numbers
+
+    def _bars(self) -> None:
+        """Colours of activation and of tension, as two bars."""
+        x, y, width, _ = SCALES
+        for column, colours in ((x + 10, ACTIVATION), (x + 10 + 0.5 * width, TENSION)):
+            for k in range(36):
+                self.canvas.box((column + 2 * k, y + 24, 2, 9), gradient(colours, (k + 0.5) / 36))
+
+    def _scale_words(self, scene: Scene) -> None:
+        x, y, width, _ = SCALES
+        largest = max((limit for _, _, limit in scene.ropes), default=0.0)
+        for column, title, ends in (
+            (x + 10, "activation", ("0", "0.5", "1")),
+            (x + 10 + 0.5 * width, "tension [N]", ("0", f"{0.25 * largest:.0f}", f"{largest:.0f}")),
+        ):
+            self.canvas.words(title, (column, y + 8), GREY, "small")
+            self.canvas.words(ends[0], (column, y + 38), GREY, "small", "left")
+            self.canvas.words(ends[1], (column + 36.0, y + 38), GREY, "small", "centre")
+            self.canvas.words(ends[2], (column + 72.0, y + 38), GREY, "small", "right")
+
+    def _readings(self, scene: Scene) -> None:
+        """Patient, time, angle, reference and error."""
+        x, y, width, _ = READINGS
+        self.canvas.words(scene.label, (x + 10, y + 9), INK, "normal", width=width - 20)
+        rows = (
+            ("time", f"{scene.time:.2f} s", INK),
+            ("angle", f"{np.degrees(scene.elbow_angle):.1f}\u00b0", INK),
+            ("reference", f"{np.degrees(scene.reference_angle):.1f}\u00b0", REFERENCE),
+            ("error", f"{scene.error_deg:+.1f}\u00b0", INK),
+        )
+        for k, (name, value, colour) in enumerate(rows):
+            self.canvas.words(name, (x + 10, y + 28 + 15 * k), GREY)
+            self.canvas.words(value, (x + width - 10, y + 28 + 15 * k), colour, align="right")

@@ -1,0 +1,35 @@
+"""Pictures of the environment: size, repeatability, and what their colours tell; no display is needed."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import exo_env  # noqa: F401
+
+pytest.importorskip("pygame")
+
+
+@pytest.fixture
+def env(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    made = gymnasium.make("exo/ElbowLift-v0", render_mode="rgb_array", patient="stroke_mild", action_mode="pid_setpoint")
+    yield made
+    made.close()
+
+
+def test_a_frame_is_a_square_of_bytes_and_repeats_bit_by_bit(env):
+    env.reset(seed=3)
+    frame = env.render()
+    assert frame.shape == (480, 480, 3) and frame.dtype == np.uint8
+    assert np.array_equal(frame, env.render()), "the same state must give the same picture"
+    assert len(np.unique(frame.reshape(-1, 3), axis=0)) > 50, "an empty canvas has few colours"
+
+
+def test_the_picture_follows_the_arm(env):
+    env.reset(seed=3)
+    before = env.render()
+    for _ in range(40):
+        env.step(np.array([0.5, 1.0], np.float32))
+    assert np.mean(np.any(env.render() != before, axis=-1)) > 0.02, "a moved forearm changes many pixels"
