@@ -108,7 +108,7 @@ def test_tensions_give_the_moment_with_one_rope(moment):
     used = AssistAsNeeded()
     env, _, _ = made(used)
     device, angle = env.unwrapped.ecosystem.device, 1.1
-    tensions = 0.5 * (used._action(moment, angle) + 1.0) * 200.0
+    tensions = 0.5 * (used._action(moment, angle) + 1.0) * np.array(env.unwrapped.drive.max_tension)
     arms = [device.moment_arm(rope, angle) for rope in (AGONIST, ANTAGONIST)]
     assert tensions @ arms == pytest.approx(moment, abs=1e-12)
     assert tensions.min() == 0.0
