@@ -1,0 +1,91 @@
+"""Command line of the agents: what there is to compare with, and how good it is.
+
+python -m agents evaluate --policy NAME [NAME ...] --population NAME --patients N --seed S --out DIR
+python -m agents policies
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+from tqdm import tqdm
+from tyro.conf import arg
+
+from agents.baselines import POLICIES, policy
+from agents.evaluate import evaluate as run_all
+from agents.evaluate import table
+from agents.figure import draw, require_matplotlib
+from dms_core.command_line import run_command
+from dms_core.errors import InputError
+from dms_core.output_file import check_writable, write_json
+from exo_env.population import population as find_population
+
+
+def evaluate(
+    policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
+    out: Path,
+    population: str = "evaluation",
+    patients: int = 20,
+    seed: int = 0,
+) -> int:
+    """Run policies on the same patients: a table, evaluation.json and evaluation.png.
+
+    Args:
+        policy_names: one or more, see `python -m agents policies`.
+        out: folder for the results; made where it is missing.
+        population: of the patients, by name or YAML file.
+        patients: how many; one episode each.
+        seed: of the patients and of the bootstrap.
+    """
+    if len(set(policy_names)) < max(len(policy_names), 1):
+        raise InputError(f"--policy {' '.join(policy_names)}: one or more different names are wanted.")
+    used = [policy(name) for name in policy_names]
+    find_population(population)
+    require_matplotlib()
+    check_writable(out / "evaluation.json")
+    with tqdm(total=len(used) * max(patients, 0), unit="episode", leave=False, disable=None) as bar:
+
+        def progress(name: str) -> None:
+            bar.set_description(name)
+            bar.update()
+
+        results = run_all(used, population, patients, seed, progress=progress)
+    write_json(out / "evaluation.json", _json(results))
+    draw(out / "evaluation.png", results)
+    print(f"{patients} patients of '{population}', seed {seed}: interquartile mean [95 % bootstrap interval]")
+    print(table(results))
+    print(f"written: {out}")
+    return 0
+
+
+def policies() -> int:
+    """List the policies that `evaluate` knows."""
+    for name, kind in POLICIES.items():
+        print(f"{name:18} {kind.title}; action mode {kind.action_mode}, sees {', '.join(kind.observation)}")
+    return 0
+
+
+def _json(value: Any) -> Any:
+    """JSON has no NaN: what could not be measured is null."""
+    if isinstance(value, dict):
+        return {k: _json(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_json(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; a mistake of the user is one message on stderr and status 2."""
+    return run_command(
+        {"evaluate": evaluate, "policies": policies},
+        "python -m agents",
+        "Policies for exo/ElbowLift-v0 and their evaluation.",
+        arguments,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

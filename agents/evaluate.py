@@ -1,0 +1,121 @@
+"""Policies on the same patients: every episode measured, every measure with its interval."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from agents.measures import MEASURES, Record, measured
+from agents.policy import Policy
+from agents.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, interquartile_mean, mean
+from dms_core.errors import InputError
+from exo_env.population import Source, population
+from exo_env.repetition import Repetition
+
+ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
+
+
+def patient_seeds(seed: int, patients: int) -> list[int]:
+    """Seeds of the episodes; more patients keep those of fewer."""
+    return [int(x) for x in np.random.SeedSequence(seed).generate_state(patients)]
+
+
+def evaluate(
+    policies: Sequence[Policy],
+    patients_of: Source,
+    patients: int,
+    seed: int,
+    *,
+    progress: Callable[[str], None] | None = None,
+    **settings: Any,
+) -> dict[str, Any]:
+    """Run every policy on the same patients, loads and repetitions.
+
+    Args:
+        policies: to compare.
+        patients_of: population by name, YAML file, or what else `patient` of the environment takes.
+        patients: how many; one episode each.
+        seed: of the patients and of the bootstrap.
+        progress: called with the name of the policy after each episode.
+        settings: further ones of the environment.
+
+    Returns:
+        JSON-able: what was run, and by policy `episodes` and `summary`, an Estimate of each measure.
+
+    Raises:
+        InputError: the population is unknown, or a number is not usable.
+    """
+    for name, value, least in (("patients", patients, 1), ("seed", seed, 0)):
+        if value < least:
+            raise InputError(f"{name} = {value}; a whole number from {least} is wanted.")
+    source, seeds = population(patients_of), patient_seeds(seed, patients)
+    found: dict[str, Any] = {}
+    for one in policies:
+        env = gymnasium.make(
+            ENVIRONMENT, disable_env_checker=True, patient=source.model_dump(), action_mode=one.action_mode,
+            observation=list(one.observation), **settings,
+        )  # fmt: skip
+        episodes = []
+        for number in seeds:
+            episodes.append({"seed": number, **episode(env, one, number)})
+            if progress is not None:
+                progress(one.name)
+        env.close()
+        found[one.name] = {"title": one.title, "summary": summary(episodes, seed), "episodes": episodes}
+    return {
+        "population": source.title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
+        "confidence": CONFIDENCE, "resamples": RESAMPLES, "policies": found,
+    }  # fmt: skip
+
+
+def episode(env: gymnasium.Env, acting: Policy, seed: int) -> dict[str, Any]:
+    """Measures of one episode, with load, repetition and what ended it."""
+    world: Any = env.unwrapped
+    observation, drawn = env.reset(seed=seed)
+    info = drawn
+    acting.reset(env)
+    record = Record(Repetition(**drawn["reference"]), world.period)
+    record.add(world.readings())
+    over = False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(acting(observation, info))
+        record.rewards.append(float(reward))
+        record.add(world.readings())
+        over = terminated or truncated
+    record.event = info.get("event")
+    return {
+        **{k: drawn[k] for k in ("load", "reference", "patient")},
+        "event": record.event,
+        "measures": measured(record),
+    }
+
+
+def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, float]]:
+    """Estimate of each measure over the episodes, by name."""
+    found = {}
+    for m in MEASURES:
+        values = np.array([e["measures"][m.name] for e in episodes])
+        # A generator for each measure and not for each policy: the same resamples for all policies.
+        found[m.name] = asdict(estimate(values, mean if m.rate else interquartile_mean, np.random.default_rng(seed)))
+    return found
+
+
+def table(results: dict[str, Any]) -> str:
+    """What is printed: a row a measure, a column a policy, interval in brackets."""
+    names = list(results["policies"])
+    rows = [["", *names]]
+    for m in MEASURES:
+        label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
+        rows.append([label, *(_cell(Estimate(**results["policies"][n]["summary"][m.name])) for n in names)])
+    widths = [max(len(row[k]) for row in rows) for k in range(len(names) + 1)]
+    lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
+             for row in rows]  # fmt: skip
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _cell(e: Estimate) -> str:
+    return f"{e.value:.3g} [{e.low:.3g}, {e.high:.3g}]"

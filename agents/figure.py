@@ -1,0 +1,73 @@
+"""The figure of an evaluation: a panel a measure, a row a policy, each patient a dot, estimate and interval above."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.measures import MEASURES
+from dms_core.errors import DmsError
+from dms_core.output_file import check_writable
+
+COLUMNS, RESOLUTION = 3, 150
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Distinct for colour-blind readers (Okabe and Ito 2008)."""
+
+
+def require_matplotlib() -> None:
+    """Say so before a long run where the figure could not be drawn.
+
+    Raises:
+        DmsError: matplotlib is missing.
+    """
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise DmsError("the figure needs matplotlib; install it with: pip install 'exo-env[pictures]'") from None
+
+
+def draw(path: Path, results: dict[str, Any]) -> None:
+    """Draw an evaluation as PNG, by software, whole or not at all."""
+    require_matplotlib()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = list(results["policies"])
+    rows = -(-len(MEASURES) // COLUMNS)
+    figure = Figure(figsize=(9.0, rows * (0.9 + 0.4 * len(names))), dpi=RESOLUTION, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, COLUMNS, sharey=True, squeeze=False)
+    for ax, m in zip(axes.flat, MEASURES, strict=False):
+        for k, name in enumerate(names):
+            _row(ax, k, results["policies"][name], m.name)
+        ax.set_title(m.label if m.unit == "-" else f"{m.label} [{m.unit}]", fontsize=9)
+        ax.set_yticks(range(len(names)), [results["policies"][n]["title"] for n in names])
+        ax.set_ylim(len(names) - 0.5, -0.5)
+        ax.grid(True, axis="x", color="0.9", linewidth=0.6)
+        ax.spines[["top", "right"]].set_visible(False)
+    for ax in list(axes.flat)[len(MEASURES) :]:
+        ax.set_visible(False)
+    n, percent = results["patients"], 100.0 * results["confidence"]
+    figure.suptitle(
+        f"{results['population']}: {n} patients, interquartile mean and {percent:g} % interval", fontsize=10
+    )
+    check_writable(path)
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png")
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_bytes(picture.getvalue())
+    os.replace(temporary, path)
+
+
+def _row(ax: Any, k: int, found: dict[str, Any], measure: str) -> None:
+    """Patients and estimate of one policy."""
+    values = np.array([e["measures"][measure] for e in found["episodes"]])
+    colour, e = COLOURS[k % len(COLOURS)], found["summary"][measure]
+    # Dots beside each other, in the order of the patients.
+    ax.plot(values, k + np.linspace(-0.25, 0.25, len(values)), ".", color=colour, alpha=0.35, markersize=4)
+    ax.plot([e["low"], e["high"]], [k, k], color=colour, linewidth=2.0)
+    ax.plot([e["value"]], [k], "o", color=colour, markersize=6, markeredgecolor="white")

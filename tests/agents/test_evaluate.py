@@ -1,0 +1,83 @@
+"""Evaluation end to end: same seed same bits, same patients for all, mistakes, files."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from agents.__main__ import main
+from agents.baselines import POLICIES, policy
+from agents.evaluate import evaluate, patient_seeds
+from agents.measures import MEASURES
+
+SHORT = {"episode_duration": 0.6}
+"""Until the lift has begun; a whole episode tells no more and takes ten times as long."""
+
+
+def run(names, patients=2, seed=0):
+    return evaluate([policy(n) for n in names], "evaluation", patients, seed, **SHORT)
+
+
+def test_seed_decides_all():
+    first, again, other = run(["none", "pid"]), run(["none", "pid"]), run(["none"], seed=1)
+    assert json.dumps(first) == json.dumps(again)
+    assert first["policies"]["none"] != other["policies"]["none"]
+
+
+def test_every_policy_meets_the_same_patients():
+    found = run(list(POLICIES))["policies"]
+    met = [[(e["seed"], e["load"], e["patient"], e["reference"]) for e in p["episodes"]] for p in found.values()]
+    assert all(m == met[0] for m in met)
+    assert met[0][0] != met[0][1]
+
+
+def test_order_of_policies_does_not_matter():
+    one, other = run(["none", "pid"], patients=1), run(["pid", "none"], patients=1)
+    assert one["policies"]["pid"] == other["policies"]["pid"]
+
+
+def test_more_patients_keep_the_first():
+    assert patient_seeds(5, 10)[:4] == patient_seeds(5, 4)
+
+
+def test_shares_of_work_sum_to_one_and_measures_are_complete():
+    for p in run(list(POLICIES))["policies"].values():
+        assert list(p["summary"]) == [m.name for m in MEASURES]
+        for e in p["episodes"]:
+            m = e["measures"]
+            assert math.isclose(m["device_work_share"] + m["patient_work_share"], 1.0, rel_tol=1e-12)
+            assert np.isfinite([m["return"], m["tracking_rms_deg"], m["peak_tension_N"], m["peak_reaction_N"]]).all()
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["--policy", "nobody"], "unknown policy 'nobody'. There are: assist_as_needed, none, pid"),
+        (["--policy", "none", "none"], "different"),
+        (["--policy", "none", "--population", "martians"], "unknown population 'martians'"),
+        (["--policy", "none", "--patients", "0"], "patients = 0"),
+        (["--policy", "none", "--seed", "-1"], "seed = -1"),
+    ],
+)
+def test_mistakes_are_one_message(arguments, said, tmp_path, capsys):
+    assert main(["evaluate", *arguments, "--out", str(tmp_path / "out")]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err and captured.err.startswith("error: ") and captured.err.count("\n") == 1
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_command_writes_table_json_and_figure(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert all(m.label in printed for m in MEASURES)
+    found = json.loads((tmp_path / "evaluation.json").read_text(), parse_constant=pytest.fail)
+    assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 1
+    assert (tmp_path / "evaluation.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.png"]
+
+
+def test_policies_lists_all(capsys):
+    assert main(["policies"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(POLICIES)
