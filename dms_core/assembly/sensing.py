@@ -51,6 +51,9 @@ class Partials(NamedTuple):
     """Derivatives of all sensor components at one state, dense.
 
     Shapes (n_y, n_q + 7) three times, (n_y, n_phi), (n_y, n_u).
+
+    The derivative of a joint moment by an input that drives one of its elements is missing and stands as 0: forces have
+    no derivative by inputs in their contract yet.
     """
 
     q: np.ndarray
