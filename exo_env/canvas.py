@@ -9,20 +9,22 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from dms_core.errors import DmsError
 
 Colour = tuple[int, int, int]
+Alignment = Literal["left", "centre", "right"]
+ALIGNMENTS: tuple[Alignment, ...] = get_args(Alignment)
 Box = tuple[float, float, float, float]
 """x, y, width, height of a part of the layout."""
 DESIGN = 480.0
 """Side of the square for which lengths of the layout are given [pixel]."""
 FINER = 2
 """Fine pixels per pixel of the result, along a side: the averages smooth all edges."""
-FONT_HEIGHTS = {"small": 13, "normal": 16, "large": 18}
+FONT_HEIGHTS = {"small": 14, "normal": 16}
 """Of the words, in lengths of the layout."""
 PROMPT = "PYGAME_HIDE_SUPPORT_PROMPT"
 
@@ -126,7 +128,7 @@ class Canvas:
         at: tuple[float, float],
         colour: Colour,
         font: str = "normal",
-        align: Literal["left", "centre", "right"] = "left",
+        align: Alignment = "left",
         width: float = np.inf,
     ) -> None:
         """A line of text; `at` is its left, central or right upper point in the layout; cut where it is wider."""
@@ -134,7 +136,7 @@ class Canvas:
         while f.size(shown)[0] > width * self.zoom and len(shown) > 2:
             shown = shown[:-2] + "\u2026"
         picture = f.render(shown, True, colour)
-        shift = {"left": 0.0, "centre": 0.5, "right": 1.0}[align] * picture.get_width()
+        shift = 0.5 * ALIGNMENTS.index(align) * picture.get_width()
         self._result.blit(picture, (round(at[0] * self.zoom - shift), round(at[1] * self.zoom)))
 
     @property

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exo_env.canvas import FINER, Box, Canvas, Colour
+from exo_env.canvas import ALIGNMENTS, FINER, Box, Canvas, Colour
 from exo_env.scene import Scene
-from exo_env.shapes import dashes, limb, spindle
+from exo_env.shapes import dashes, limb, rounded, spindle
 
 PAPER, CARD, FRAME = (255, 255, 255), (249, 250, 251), (212, 216, 222)
 INK, GREY = (33, 37, 43), (112, 119, 129)
@@ -30,9 +30,16 @@ WINDOW = 2.8
 """Side of the main view over the length of the upper arm [-]."""
 ELBOW_AT = (0.27, 0.47)
 """Place of the elbow in the main view, as shares of its side from the left and from the top."""
-READINGS: Box = (334, 10, 136, 92)
-INSET: Box = (352, 296, 118, 174)
-SCALES: Box = (10, 414, 172, 56)
+READINGS: Box = (304, 10, 166, 92)
+INSET: Box = (352, 318, 118, 152)
+SCALES: Box = (10, 416, 180, 54)
+BAR = 72
+"""Length of a colour bar, in lengths of the layout."""
+TRUNK = (
+    (0.10, 1.0), (0.11, 0.42), (0.22, 0.16), (0.40, -0.25), (0.42, -0.80), (0.26, -1.50), (0.26, -2.8),
+    (-0.60, -2.8), (-0.58, -1.60), (-0.68, -0.80), (-0.62, -0.10), (-0.34, 0.26), (-0.26, 0.50), (-0.26, 1.0),
+)  # fmt: skip
+"""Corners of the rounded outline of trunk and neck, from the shoulder, over the length of the upper arm [-]."""
 
 
 def gradient(colours: Sequence[Colour], share: float) -> Colour:
@@ -47,6 +54,12 @@ def darker(colour: Colour) -> Colour:
     """For the edge of a shape."""
     red, green, blue = colour
     return 11 * red // 20, 11 * green // 20, 11 * blue // 20
+
+
+def lighter(colour: Colour) -> Colour:
+    """For the part of a shape that the light falls on."""
+    red, green, blue = colour
+    return red + (255 - red) // 4, green + (255 - green) // 4, blue + (255 - blue) // 4
 
 
 def tension_share(tension: float, largest: float) -> float:
@@ -86,13 +99,16 @@ class Picture:
             scene.elbow[1] + ELBOW_AT[1] * side,
         )
         self._torso(view, scene, upper_arm)
-        if scene.gym_rope is not None:
-            self._handle(view, scene, scene.gym_rope)
+        ghost = self._ghost(view, scene, upper_arm)
+        self.canvas.veil(ghost, REFERENCE, 0.16)
         self._arm(view, scene, upper_arm)
-        self._ghost(view, scene, upper_arm)
+        for dash in dashes(ghost, 5.0 * self.canvas.unit):
+            self.canvas.line(dash, REFERENCE, 1.5)
         for points, activation in scene.muscles:
             self._muscle(view(points), activation)
         self._device(view, scene)
+        if scene.gym_rope is not None:
+            self._handle(view, scene.gym_rope)
         for box in (READINGS, SCALES):
             self.canvas.box(box, CARD, border=FRAME, round_by=5)
         self._bars()
@@ -108,42 +124,40 @@ class Picture:
 
     def _torso(self, view: View, scene: Scene, upper_arm: float) -> None:
         """Trunk and neck behind the arm, as far as the picture shows them."""
-        s, r = scene.shoulder, view.scale * upper_arm
-        chest = s + np.array((-0.17, -0.24)) * upper_arm
-        for end, a, b in (((-0.10, 0.9), 0.17, 0.15), ((-0.20, -2.6), 0.42, 0.36)):
-            self.canvas.polygon(limb(view(chest), view(s + np.array(end) * upper_arm), a * r, b * r), TORSO)
+        corners = np.asarray(scene.shoulder) + upper_arm * np.array(TRUNK)
+        self.canvas.polygon(rounded(view(corners)), TORSO)
 
     def _arm(self, view: View, scene: Scene, upper_arm: float) -> None:
         """Upper arm, forearm and hand."""
         r = view.scale * upper_arm
         shoulder, elbow, grip = view(scene.shoulder), view(scene.elbow), view(scene.grip)
-        wrist = elbow + 0.80 * (grip - elbow)
+        belly, wrist, knuckles = (elbow + share * (grip - elbow) for share in (0.24, 0.80, 0.94))
         parts = [
             limb(shoulder, elbow, 0.22 * r, 0.15 * r),
-            limb(elbow, wrist, 0.15 * r, 0.085 * r),
-            limb(wrist, grip, 0.085 * r, 0.125 * r),
+            limb(elbow, belly, 0.15 * r, 0.155 * r),
+            limb(belly, wrist, 0.155 * r, 0.08 * r),
+            limb(wrist, knuckles, 0.08 * r, 0.10 * r),
+            limb(knuckles, grip, 0.115 * r, 0.125 * r),
         ]
         for outline in parts:
             self.canvas.polygon(outline, SKIN, SKIN_EDGE, 1.4)
         for outline in parts:
             self.canvas.polygon(outline, SKIN)
 
-    def _ghost(self, view: View, scene: Scene, upper_arm: float) -> None:
-        """The forearm where the reference wants it; its turn is drawn as if the elbow axis faced the viewer."""
+    def _ghost(self, view: View, scene: Scene, upper_arm: float) -> np.ndarray:
+        """Outline of the forearm where the reference wants it; its turn is drawn as if the elbow axis faced the viewer."""
         r = view.scale * upper_arm
         turn = scene.reference_angle - scene.elbow_angle
         c, s = np.cos(turn), np.sin(turn)
         grip = scene.elbow + np.array([[c, -s], [s, c]]) @ (np.asarray(scene.grip) - scene.elbow)
-        outline = limb(view(scene.elbow), view(grip), 0.17 * r, 0.145 * r)
-        self.canvas.veil(outline, REFERENCE, 0.13)
-        for dash in dashes(outline, 5.0 * self.canvas.unit):
-            self.canvas.line(dash, REFERENCE, 1.5)
+        return limb(view(scene.elbow), view(grip), 0.17 * r, 0.14 * r)
 
     def _muscle(self, points: np.ndarray, activation: float) -> None:
         """A spindle that swells with activation."""
         colour = gradient(ACTIVATION, activation)
         belly = (8.0 + 5.0 * activation) * self.canvas.unit
         self.canvas.polygon(spindle(points, belly, 0.35 * belly), colour, darker(colour), 0.7)
+        self.canvas.polygon(spindle(points, 0.3 * belly, 0.0), lighter(colour))
 
     # Device and machine
 
@@ -172,11 +186,13 @@ class Picture:
         self.canvas.disc(centre, 0.80 * radius, STEEL_LIGHT)
         self.canvas.disc(centre, 0.32 * radius, STEEL_EDGE)
 
-    def _handle(self, view: View, scene: Scene, rope: np.ndarray) -> None:
+    def _handle(self, view: View, rope: np.ndarray) -> None:
         """The handle in the hand and the rope that leaves the picture."""
-        self.canvas.line(view(rope[:2]), ROPE, 2.0)
-        self.canvas.line(np.array([view(scene.grip), view(rope[0])]), IRON, 5.0)
-        self.canvas.disc(view(rope[0]), 3.4, IRON)
+        grip, tied, pulley = view(rope[:3])
+        self.canvas.line(np.array([tied, pulley]), ROPE, 2.0)
+        self.canvas.line(np.array([grip, tied]), IRON, 4.0)
+        self.canvas.disc(grip, 7.0, IRON)
+        self._pin(tied, 4.0)
 
     def _machine(self, scene: Scene, rope: np.ndarray) -> tuple[float, float]:
         """The whole machine with the arm as two strokes; returns where the mass is written, in the layout."""
@@ -190,8 +206,10 @@ class Picture:
         self.canvas.box(INSET, CARD, border=FRAME, round_by=5)
         with self.canvas.inside((x + 1, y + 1, width - 2, height - 2)):
             self.canvas.line(view(np.array([scene.shoulder, scene.elbow, scene.grip])), SKIN_EDGE, 6.0)
-            self.canvas.line(view(np.array([scene.grip, rope[0]])), IRON, 2.5)
-            self.canvas.line(view(rope), ROPE, 1.4)
+            self.canvas.line(view(rope[:2]), IRON, 2.5)
+            rail = view(rope[-2]) + np.array([(0.0, 0.0), (0.0, 100.0 * unit)])
+            self.canvas.line(rail, FRAME, 4.0)
+            self.canvas.line(view(rope[1:]), ROPE, 1.4)
             for pulley in scene.pulleys:
                 self._pin(view(pulley), 5.0)
             end = rope[-1] if scene.weight is None else scene.weight
@@ -204,26 +222,26 @@ class Picture:
     def _bars(self) -> None:
         """Colours of activation and of tension, as two bars."""
         x, y, width, _ = SCALES
-        for column, colours in ((x + 10, ACTIVATION), (x + 10 + 0.5 * width, TENSION)):
-            for k in range(36):
-                self.canvas.box((column + 2 * k, y + 24, 2, 9), gradient(colours, (k + 0.5) / 36))
+        for column, colours in ((x + 10, ACTIVATION), (x + width - 10 - BAR, TENSION)):
+            for k in range(BAR // 2):
+                self.canvas.box((column + 2 * k, y + 23, 2, 9), gradient(colours, (2 * k + 1) / BAR))
 
     def _scale_words(self, scene: Scene) -> None:
+        """Titles and ends of the bars; half of the scale of tensions is a quarter of the largest."""
         x, y, width, _ = SCALES
         largest = max((limit for _, _, limit in scene.ropes), default=0.0)
         for column, title, ends in (
             (x + 10, "activation", ("0", "0.5", "1")),
-            (x + 10 + 0.5 * width, "tension [N]", ("0", f"{0.25 * largest:.0f}", f"{largest:.0f}")),
+            (x + width - 10 - BAR, "tension [N]", ("0", f"{0.25 * largest:.0f}", f"{largest:.0f}")),
         ):
-            self.canvas.words(title, (column, y + 8), GREY, "small")
-            self.canvas.words(ends[0], (column, y + 38), GREY, "small", "left")
-            self.canvas.words(ends[1], (column + 36.0, y + 38), GREY, "small", "centre")
-            self.canvas.words(ends[2], (column + 72.0, y + 38), GREY, "small", "right")
+            self.canvas.words(title, (column, y + 7), GREY, "small")
+            for text, share, align in zip(ends, (0.0, 0.5, 1.0), ALIGNMENTS, strict=True):
+                self.canvas.words(text, (column + share * BAR, y + 37), GREY, "small", align)
 
     def _readings(self, scene: Scene) -> None:
         """Patient, time, angle, reference and error."""
         x, y, width, _ = READINGS
-        self.canvas.words(scene.label, (x + 10, y + 9), INK, "normal", width=width - 20)
+        self.canvas.words(scene.label, (x + 10, y + 9), INK, "small", width=width - 20)
         rows = (
             ("time", f"{scene.time:.2f} s", INK),
             ("angle", f"{np.degrees(scene.elbow_angle):.1f}\u00b0", INK),
