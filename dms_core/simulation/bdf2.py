@@ -53,19 +53,22 @@ def put_guess(m, s, c0, lam_slope):
 
 
 @compiled
-def solve_stage(m, s, o, t, c0, lam_slope):
-    """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once."""
+def solve_stage(m, s, o, t, c0, lam_slope, last):
+    """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once.
+
+    Only the last stage of a step has to close the constraints.
+    """
     count = ints(s, STATE.counts)
     set_inputs(m, s, t, True)
     count[AGE] += 1
     if count[AGE] > MAX_AGE:
         count[STALE] = 1
     put_guess(m, s, c0, lam_slope)
-    code, iterations = newton(m, s, o, c0)
+    code, iterations = newton(m, s, o, c0, last)
     if code == STALE_MATRIX:
         count[STALE] = 1
         put_guess(m, s, c0, lam_slope)
-        code, more = newton(m, s, o, c0)
+        code, more = newton(m, s, o, c0, last)
         iterations += more
         if code == STALE_MATRIX:
             code = DIVERGED
@@ -95,7 +98,7 @@ def bdf2_step(m, s, o, h):
     h1, h2 = clock[H_BEFORE], clock[H_BEFORE2]
     ratio = h / h1
     _prepare_bdf2(s, h, h1)
-    code, iterations = solve_stage(m, s, o, clock[T] + h, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h, ratio)
+    code, iterations = solve_stage(m, s, o, clock[T] + h, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h, ratio, True)
     if code != CONVERGED:
         return code, iterations, 0.0
     C = h**3 * (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio))
@@ -142,11 +145,11 @@ def start_step(m, s, o, h):
     """One SDIRK2 step of size h into w. Gives (code, iterations, weighted local error)."""
     t, c0 = floats(s, STATE.clock)[T], 1.0 / (GAMMA * h)
     _prepare_first_stage(s, h, c0)
-    code, first = solve_stage(m, s, o, t + GAMMA * h, c0, 0.0)
+    code, first = solve_stage(m, s, o, t + GAMMA * h, c0, 0.0, False)
     if code != CONVERGED:
         return code, first, 0.0
     _prepare_second_stage(s, h, c0)
-    code, second = solve_stage(m, s, o, t + h, c0, 0.0)
+    code, second = solve_stage(m, s, o, t + h, c0, 0.0, True)
     if code != CONVERGED:
         return code, first + second, 0.0
     w, is_second, error = inner(s, STATE.w), flags(m, MODEL.second), 0.0

@@ -184,8 +184,8 @@ def close_constraints(m, s, o, c0):
 
 
 @compiled
-def newton(m, s, o, c0):
-    """Solve the stage from the guess in w. Gives (code, iterations).
+def newton(m, s, o, c0, close):
+    """Solve the stage from the guess in w; `close` brings the constraints to their tolerance. Gives (code, iterations).
 
     STALE_MATRIX asks the caller to put the guess back and to call again with count[STALE] = 1.
     """
@@ -218,7 +218,7 @@ def newton(m, s, o, c0):
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
         left = norm * contraction / (1.0 - contraction) if k > 0 else 3.0 * norm * max(contraction, 0.05)
-        if left < o.newton_tol and close_constraints(m, s, o, c0):
+        if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
             clock[CONTRACTION] = contraction
             if contraction > SLOW:
                 count[STALE] = 1
