@@ -24,12 +24,13 @@ TOLERANCE = 1e-11
 @compiled
 def _change(m, s, share):
     """Add a share of the correction to the unknowns; gives the largest relative correction."""
-    w, second, active = inner(s, STATE.w), flags(m, MODEL.second), indices(m, MODEL.active)
+    w, second = inner(s, STATE.w), flags(m, MODEL.second)
+    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
     scale, x = floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
     v, a, lam = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
-    n, largest = second.shape[0], 0.0
-    for i in range(n):
-        change = share * x[i]
+    n, largest = free.shape[0], 0.0
+    for k in range(n):
+        i, change = free[k], share * x[k]
         if second[i]:
             a[i] += change
             size = abs(change) / (1.0 + abs(a[i]))
@@ -47,12 +48,13 @@ def _change(m, s, share):
 @compiled
 def _correct(m, s):
     """Newton correction at the present unknowns; False if the matrix is singular."""
-    w, active, b = inner(s, STATE.w), indices(m, MODEL.active), floats(s, STATE.rate_b)
+    w, b = inner(s, STATE.w), floats(s, STATE.rate_b)
+    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
     run_part(m, s, RATE_MATRIX)
     r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
-    n = b.shape[0] - active.shape[0]
+    n = free.shape[0]
     for i in range(n):
-        b[i] = -r2[i]
+        b[i] = -r2[free[i]]
     for k in range(active.shape[0]):
         b[n + k] = -phi_a[active[k]]
     ints(s, STATE.counts)[FACTORISATIONS] += 1
@@ -66,14 +68,15 @@ def _correct(m, s):
 def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
     second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
+    free = indices(m, MODEL.free)
     share, before = 1.0, math.inf
     for _ in range(MAX_ITERATIONS):
         if not _correct(m, s):
             return False
         largest = 0.0
-        for i in range(second.shape[0]):
-            if not second[i]:
-                largest = max(largest, abs(x[i]) / scale[i])
+        for k in range(free.shape[0]):
+            if not second[free[k]]:
+                largest = max(largest, abs(x[k]) / scale[free[k]])
         # Only first-order rates are nonlinear; where their corrections grow, shorten them.
         share = 0.5 * share if largest > 2.0 * before else min(1.0, 2.0 * share)
         before = largest
@@ -149,10 +152,10 @@ def jump_rates(m, s):
     _put_state(m, s)
     run_part(m, s, RESIDUAL)
     b, r2 = floats(s, STATE.rate_b), floats(inner(s, STATE.w), WORK.r2)
-    n = flags(m, MODEL.second).shape[0]
+    free = indices(m, MODEL.free)
     b[:] = 0.0
-    for i in range(n):
-        b[i] = -r2[i]
+    for i in range(free.shape[0]):
+        b[i] = -r2[free[i]]
     run_part(m, s, RATE_SOLUTION)
     if not _change(m, s, 1.0) < math.inf:
         return False

@@ -30,6 +30,8 @@ class Tables(NamedTuple):
     newton_lu: LuTables
     rates: RatePattern
     rate_lu: LuTables
+    free: np.ndarray
+    """Coordinates that are solved for: all but those of welded bodies, (n_free,)."""
     active: np.ndarray
     """Constraint rows that are solved for, (n_active,)."""
     second: np.ndarray
@@ -99,7 +101,7 @@ MODEL, STATE = fields(Tables), fields(State)
 
 def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
     """Storage of both linear systems."""
-    n, k = len(tables.second), len(tables.active)
+    n, k = len(tables.free), len(tables.active)
     newton, rates = tables.newton_lu, tables.rate_lu
     return {
         "newton_values": storage(newton.size),
