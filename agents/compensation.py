@@ -14,7 +14,6 @@ subtracted: of who can lift, the PID has to take the surplus back, and tracking 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import gymnasium
@@ -42,14 +41,10 @@ def holding_tensions(ecosystem: Ecosystem, person: Person, load: float, angles: 
         angles: of the elbow [rad], shape (n,).
     """
     assert ecosystem.machine is not None
-    arm = Arm(person)
-    known, link = InternalModel(arm, ecosystem.machine, load), ecosystem.device.lower_link
-    g, (x, y, _) = float(np.linalg.norm(arm.gravity)), link.centre_of_mass
-    found = []
-    for angle in map(float, angles):
-        moment = known.resting_moment(angle) + link.mass * g * (x * math.cos(angle) - y * math.sin(angle))
-        found.append(moment / ecosystem.device.moment_arm(AGONIST, angle))
-    return np.array(found)
+    arm, device = Arm(person), ecosystem.device
+    known, g = InternalModel(arm, ecosystem.machine, load), float(np.linalg.norm(arm.gravity))
+    moments = [known.resting_moment(angle) + device.own_moment(angle, g) for angle in map(float, angles)]
+    return np.array(moments) / [device.moment_arm(AGONIST, angle) for angle in map(float, angles)]
 
 
 class CompensatedPid(Policy):
