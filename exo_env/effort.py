@@ -12,9 +12,9 @@ For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activ
 s is the effort (slacking.py), M_F the fatigued share (fatigue.py). Weakness is a ceiling, since what was measured after
 stroke is the largest torque: who is weak wants a larger share of what is left for the same moment, and gives it up to
 all of it. That patients know their weakness so well is assumed; the rest of it they learn by their errors (s above 1).
-Weakness is of the descending command: reflex and tremor know no ceiling. The flexors are stretched by extension of the elbow, the extensors by flexion. Tremor
-alternates between the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a
-spectral peak of that width at half height.
+Weakness is of the descending command: reflex and tremor know no ceiling. The flexors are stretched by extension of the
+elbow, the extensors by flexion. Tremor alternates between the groups and its phase wanders with
+2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of that width at half height.
 
 All signals are held over a period, so a delay that is no multiple of it takes the mean of the delayed signal over the
 period: linear interpolation between two samples. One patient is one row of numbers (`PATIENT` in patient.py) and one
@@ -245,7 +245,8 @@ class Effort:
         stretch = -rate * np.array(SIGN)
         noise = self.generator.standard_normal()
         step_effort(
-            self.numbers, self.state, self._samples, self.period, _activations(wanted), float(error), stretch, noise, out,
+            self.numbers, self.state, self._samples, self.period, _activations(wanted), float(error), stretch, noise,
+            out,
         )  # fmt: skip
         return out
 

@@ -86,7 +86,7 @@ class ElbowLiftEnv(gymnasium.Env):
     | Term       | Value                                                    | Weight |
     |------------|----------------------------------------------------------|--------|
     | tracking   | exp(-(error / 5 deg)^2)                                  | 1      |
-    | assistance | -(moment of the device beyond need) / need, at least -2  | 1      |
+    | assistance | -(moment of the device beyond need) / need, at least -2  | 0.75   |
     | smoothness | -mean square change of the action / 4                    | 0.2    |
     | reaction   | -(elbow reaction / 500 N - 1) beyond 500 N, at least -2  | 0.2    |
     | unsafe     | -1 where an event ends the episode                       | 100    |
@@ -95,8 +95,8 @@ class ElbowLiftEnv(gymnasium.Env):
     At rest on the reference, muscles as the patient's command wants them; with "rope_tension" the agonist holds what
     they do not. Patient, load (0.5 to 2 kg) and repetition are drawn from the environment's one generator.
     `reset(options={...})` fixes any of `patient`, `load` [kg], `reference` (fields of a repetition) and
-    `initial_angle_deg`; all else is drawn as without it. `info` of a reset holds what was drawn, and `ability`: the share
-    of arm and load that the patient can hold (`exo_env/need.py`).
+    `initial_angle_deg`; all else is drawn as without it. `info` of a reset holds what was drawn, and `ability`, the
+    share of arm and load that the patient can hold (`exo_env/need.py`).
 
     ## Episode End
     Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the

@@ -49,8 +49,8 @@ class Patient(Settings):
     strength: float = Field(default=1.0, gt=0.0, le=5.0, description="factor on every muscle's F0 [-]; assumed")
     maximum_activation_flexors: float = Field(
         default=1.0, ge=0.0, le=1.0,
-        description="share of the flexors that effort can activate [-], a ceiling; stroke: torque of the more affected side 44 % "
-        "below healthy [Bowden 2014], half of healthy six weeks after [Canning 1999]",
+        description="share of the flexors that effort can activate [-], a ceiling; stroke: torque of the more affected "
+        "side 44 % below healthy [Bowden 2014], half of healthy six weeks after [Canning 1999]",
     )  # fmt: skip
     maximum_activation_extensors: float = Field(
         default=1.0, ge=0.0, le=1.0,
@@ -123,8 +123,8 @@ class Patient(Settings):
     )
     slacking_rate: float = Field(
         default=0.0, ge=0.0, le=10.0,
-        description="rate at which effort is forgotten [1/s]; that it is, all the time and in proportion: from movement "
-        "to movement [Emken 2007], within one [Smith 2018]; value assumed",
+        description="rate at which effort is forgotten [1/s]; that it is, all the time and in proportion: from "
+        "movement to movement [Emken 2007], within one [Smith 2018]; value assumed",
     )  # fmt: skip
     effort_recovery: float = Field(
         default=0.0, ge=0.0, le=100.0,

@@ -16,11 +16,11 @@
                  Elbow reaction above that of quiet lifting, which pulling against oneself causes; assumed.
     unsafe       -1 once, where an event ends the episode, see events.py
 
-The most that a step can earn is 1, a followed reference without a newton too much: 300 in an episode of 6 s. Tracking
-and help have the same weight, so that a robot that does everything for somebody who needs nothing earns nothing, as
-one that lets everybody see the error does; half of that help costs as much as a constant error of 4.2 deg, which a
-therapist can just about measure. An unsafe event costs as much as two seconds of the best, beside what is lost by the
-end of the episode. The weights are assumed.
+The most that a step can earn is 1, a followed reference without a newton too much: 300 in an episode of 6 s. With the
+default weights a robot that does everything for somebody who needs nothing still earns a quarter of that, more than an
+arm that hangs; half of such help costs as much as a constant error of 3.4 deg, the spread of a therapist's reading. An
+unsafe event costs as much as two seconds of the best, beside what is lost by the end of the episode. The weights are
+assumed.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Weights(Settings):
     """Factor on each term."""
 
     tracking: float = Field(default=1.0, ge=0.0, le=1e6)
-    assistance: float = Field(default=1.0, ge=0.0, le=1e6)
+    assistance: float = Field(default=0.75, ge=0.0, le=1e6)
     smoothness: float = Field(default=0.2, ge=0.0, le=1e6)
     reaction: float = Field(default=0.2, ge=0.0, le=1e6)
     unsafe: float = Field(default=100.0, ge=0.0, le=1e6)

@@ -19,7 +19,8 @@ TIMES = np.linspace(0.0, 6.0, 301)
 COURSE = Repetition().course(TIMES)
 
 
-def known(patient=Patient(), load=1.0):
+def known(patient=None, load=1.0):
+    patient = patient or Patient()
     return InternalModel(Arm(patient.person), GymMachine.from_config("gym_machine/pulley.yaml"), load)
 
 
