@@ -178,6 +178,10 @@ def step_effort(par, state, n, period, wanted, error, stretch, noise, out):
         noise: a standard normal number for the tremor.
         out: excitations at the end of the period [-], shape (6,).
     """
+    state[STATE.effort] = advance_effort(
+        state[STATE.effort], error, par[PATIENT.slacking_rate], par[PATIENT.effort_recovery],
+        par[PATIENT.least_effort], period,
+    )  # fmt: skip
     remember(par, state, n, wanted, error, stretch)
     turn = 2.0 * math.pi * par[PATIENT.tremor_frequency] * period
     tremor = par[PATIENT.tremor_amplitude] * math.sin(state[STATE.phase] + turn)
@@ -193,10 +197,6 @@ def step_effort(par, state, n, period, wanted, error, stretch, noise, out):
         )  # fmt: skip
     wandering = math.sqrt(2.0 * math.pi * par[PATIENT.tremor_width] * period) * noise
     state[STATE.phase] = (state[STATE.phase] + turn + wandering) % (2.0 * math.pi)
-    state[STATE.effort] = advance_effort(
-        state[STATE.effort], error, par[PATIENT.slacking_rate], par[PATIENT.effort_recovery],
-        par[PATIENT.least_effort], period,
-    )  # fmt: skip
 
 
 class Effort:
