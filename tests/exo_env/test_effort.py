@@ -283,8 +283,8 @@ def test_half_the_period_gives_the_same_patient():
     signals = {"error": np.full(100, 0.02), "rate": np.full(100, 1.0)}
     a = _course(coarse, command, **signals)
     b = _course(fine, np.repeat(command, 2, axis=0), **{k: np.repeat(v, 2) for k, v in signals.items()})
-    # Effort is integrated exactly, compartments to 1e-5.
-    np.testing.assert_allclose(b[1::2], a, rtol=0.0, atol=2e-5)
+    # Effort is integrated exactly; what is fatigued is that of a period's beginning: 0.02 / s in 0.01 s.
+    np.testing.assert_allclose(b[1::2], a, rtol=0.0, atol=2e-4)
     assert coarse.effort == pytest.approx(fine.effort, rel=1e-12)
 
 
