@@ -4,6 +4,7 @@ Importing it registers the environment exo/ElbowLift-v0 with Gymnasium and loads
 the modules:
 
     lift_env                          the environment, made of actions, observations, rewards, events, episode
+    vector_env, sb3                   many of them in one compiled batch, for Gymnasium and for Stable-Baselines3
     human, exoskeleton, gym_machine   the three subsystems of Fig. 8, from configs/
     ecosystem                         joins them into one dms_core System
     motor_command                     what the subject's muscles are told
@@ -14,4 +15,8 @@ the modules:
 
 from gymnasium.envs.registration import register
 
-register(id="exo/ElbowLift-v0", entry_point="exo_env.lift_env:ElbowLiftEnv")
+register(
+    id="exo/ElbowLift-v0",
+    entry_point="exo_env.lift_env:ElbowLiftEnv",
+    vector_entry_point="exo_env.vector_env:ElbowLiftVectorEnv",
+)

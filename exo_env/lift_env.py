@@ -277,16 +277,21 @@ class ElbowLiftEnv(gymnasium.Env):
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
         plant, status = self._plant, self._plant.status
         if run_period(self._packed.table, used) != DONE:
-            self._rescue(episode)
+            self.rescue()
         terminated, truncated = bool(status[STATUS.event] != NOTHING), bool(status[STATUS.step] == status[STATUS.steps])
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
         return plant.observation.astype(np.float32), float(plant.reward[0]), terminated, truncated, self._info()
 
-    def _rescue(self, episode: Episode) -> None:
+    @property
+    def table(self) -> np.ndarray:
+        """The packed Plant of the present episode, for a batch."""
+        return self._packed.table
+
+    def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
-        world = episode.world
+        episode, world = self.episode, self.episode.world
         result = world.advance(float(episode.times[self._plant.status[STATUS.step] + 1]))
         if result is Result.SUCCESS:
             self._plant.status[STATUS.code] = DONE
@@ -295,7 +300,7 @@ class ElbowLiftEnv(gymnasium.Env):
             self._readout = Readout(episode, self._plant)
         finish(self._packed.table)
 
-    def _happened(self) -> str | None:
+    def happened(self) -> str | None:
         """The sentence on what ended the episode, or None."""
         code, r = self._plant.status[STATUS.event], self._readout
         if code == SOLVER:
@@ -328,7 +333,7 @@ class ElbowLiftEnv(gymnasium.Env):
 
     def _info(self) -> dict[str, Any]:
         """Of a step."""
-        plant, r, happened = self._plant, self._readout, self._happened()
+        plant, r, happened = self._plant, self._readout, self.happened()
         info: dict[str, Any] = {
             "reward_terms": dict(zip(TERMS, plant.terms[0].tolist(), strict=True)),
             "reward_weights": self._weights.copy(),

@@ -1,0 +1,103 @@
+"""Many worlds at once: a control period of each in compiled code, on several threads, without the Python lock."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from dms_core.assembly.arena import floats, ints, matrix, table_at
+from dms_core.simulation.step_control import DONE
+from exo_env.control_period import PLANT, READING, STATUS, run_period
+from exo_env.effort import STATE as EFFORT
+from exo_env.jit import compiled
+from exo_env.rewards import TERMS
+
+FIELDS, N_TERMS = len(PLANT), len(TERMS)
+NUMBERS = ("reward", *TERMS, "time", "tracking_error", "device_share", "effort", "elbow_reaction")
+"""What is collected of each world, in the order of `Batch.numbers`; time in control periods, error in rad."""
+CHUNKS = 4
+"""Pieces of work a thread, so that none waits long for the slowest world."""
+
+
+@compiled
+def collect(p, observation, numbers, status):
+    """What the agent is told of a world."""
+    seen, r, terms, now = floats(p, PLANT.observation), floats(p, PLANT.reading), matrix(p, PLANT.terms)[0], ints(p, PLANT.status)
+    for i in range(observation.shape[0]):
+        observation[i] = seen[i]
+    numbers[0] = floats(p, PLANT.reward)[0]
+    for i in range(N_TERMS):
+        numbers[1 + i] = terms[i]
+    numbers[N_TERMS + 1], numbers[N_TERMS + 2] = now[STATUS.step], r[READING.error]
+    numbers[N_TERMS + 3], numbers[N_TERMS + 4] = r[READING.share], floats(p, PLANT.effort)[EFFORT.effort]
+    numbers[N_TERMS + 5] = r[READING.reaction]
+    for i in range(status.shape[0]):
+        status[i] = now[i]
+
+
+@compiled(nogil=True)
+def run_some(addresses, which, first, last, actions, observations, numbers, status):
+    """A control period of the worlds which[first:last]; where the solver gives up, `status` holds its code."""
+    for k in range(first, last):
+        i = which[k]
+        p = table_at(addresses[i], FIELDS)
+        if run_period(p, actions[i]) == DONE:
+            collect(p, observations[i], numbers[i], status[i])
+        else:
+            status[i, STATUS.code] = ints(p, PLANT.status)[STATUS.code]
+
+
+class Batch:
+    """Worlds side by side.
+
+    Args:
+        size: number of worlds.
+        observed: components of an observation.
+        threads: that step them; None takes one for each core.
+
+    Attributes:
+        observations: float32, shape (size, observed).
+        numbers: shape (size, len(NUMBERS)).
+        status: counters of control_period.STATUS, shape (size, 4).
+    """
+
+    def __init__(self, size: int, observed: int, threads: int | None = None) -> None:
+        self.threads = min(size, threads or len(os.sched_getaffinity(0)))
+        self._addresses = np.zeros(size, np.int64)
+        self.observations = np.zeros((size, observed), np.float32)
+        self.numbers = np.zeros((size, len(NUMBERS)))
+        self.status = np.zeros((size, len(STATUS)), np.int64)
+        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+
+    def put(self, i: int, table: np.ndarray) -> None:
+        """World i is that of a packed Plant, which the caller keeps alive."""
+        self._addresses[i] = table.ctypes.data
+        collect(table, self.observations[i], self.numbers[i], self.status[i])
+
+    def run(self, which: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, 2).
+
+        Returns:
+            Those whose solver gave up.
+        """
+        given = (self._addresses, which, actions, self.observations, self.numbers, self.status)
+        if self._pool is None or len(which) == 1:
+            _run(given, 0, len(which))
+        else:
+            edges = np.linspace(0, len(which), min(CHUNKS * self.threads, len(which)) + 1).astype(int)
+            for job in [self._pool.submit(_run, given, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]:
+                job.result()
+        return which[self.status[which, STATUS.code] != DONE]
+
+    def close(self) -> None:
+        """End the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+
+def _run(given: tuple[np.ndarray, ...], first: int, last: int) -> None:
+    addresses, which, actions, observations, numbers, status = given
+    run_some(addresses, which, first, last, actions, observations, numbers, status)
