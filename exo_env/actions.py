@@ -33,6 +33,8 @@ class RopeTension(Settings):
     """Drive of action mode 'rope_tension'."""
 
     names: ClassVar[tuple[str, str]] = ("agonist tension", "antagonist tension")
+    rtol: ClassVar[float] = 0.01
+    """Of the solver, with which the elbow stays within 1e-3 rad of the exact solution (tests/benchmarks)."""
     inputs: ClassVar[tuple[str, str]] = COMMANDS
     time_constant: float = Field(
         default=0.02, ge=0.001, le=0.5, description="lag of the tension [s]; assumed: 8 Hz, of a series elastic drive"
@@ -85,6 +87,8 @@ class PidSetpoint(Settings):
     """Drive of action mode 'pid_setpoint'."""
 
     names: ClassVar[tuple[str, str]] = ("setpoint change", "authority")
+    rtol: ClassVar[float] = 0.1
+    """As above; what is left over is in the motors' tensions, and the controller keeps it from the elbow."""
     inputs: ClassVar[tuple[str, str]] = (SETPOINT, ASSISTANCE)
     setpoint_range: float = Field(default=0.2, gt=0.0, le=1.0, description="largest setpoint change [rad]; assumed")
     filter_frequency: float = Field(default=20.0, gt=0.0, le=200.0, description="of the setpoint filter [rad/s]")

@@ -24,7 +24,12 @@ CHUNKS = 4
 @compiled
 def collect(p, observation, numbers, status):
     """What the agent is told of a world."""
-    seen, r, terms, now = floats(p, PLANT.observation), floats(p, PLANT.reading), matrix(p, PLANT.terms)[0], ints(p, PLANT.status)
+    seen, r, terms, now = (
+        floats(p, PLANT.observation),
+        floats(p, PLANT.reading),
+        matrix(p, PLANT.terms)[0],
+        ints(p, PLANT.status),
+    )
     for i in range(observation.shape[0]):
         observation[i] = seen[i]
     numbers[0] = floats(p, PLANT.reward)[0]

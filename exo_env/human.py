@@ -17,7 +17,7 @@ J. Biomech. 29:1223-1230:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from math import radians
 from typing import Any, Literal, NamedTuple
 
@@ -188,6 +188,16 @@ class Arm:
 
     def path(self, muscle: str, *, welded: bool = False) -> tuple[PathPoint, ...]:
         """Points of a muscle; with `welded`, torso and humerus are parts of the ground."""
+        if (muscle, welded) not in self._paths:
+            self._paths[muscle, welded] = self._path(muscle, welded)
+        return self._paths[muscle, welded]
+
+    @cached_property
+    def _paths(self) -> dict[tuple[str, bool], tuple[PathPoint, ...]]:
+        """Of the muscles asked for so far."""
+        return {}
+
+    def _path(self, muscle: str, welded: bool) -> tuple[PathPoint, ...]:
         ours = {theirs: name for name, theirs in BODIES.items()}
         points = []
         for p in self.facts["muscles"][muscle]["path"]:
@@ -206,7 +216,7 @@ class Arm:
     def muscle(self, name: str, **more: Any) -> ThelenMuscle:
         """A muscle of the person; `more` are further fields of ThelenMuscle, or others in place of these."""
         facts = {**self.facts["muscle_defaults"], **self.facts["muscles"][name]}
-        k = _path_factor(self.person, name)
+        k = self._path_factors[name]
         size = self.person.strength * self.person.body_mass / MASS_0 * HEIGHT_0 / self.person.height
         facts |= {
             "max_isometric_force": size * facts["max_isometric_force"],
@@ -215,6 +225,13 @@ class Arm:
             "path": self.path(name),
         }
         return ThelenMuscle(**{"name": name, "excitation": excitation_name(name), **facts, **more})
+
+    @cached_property
+    def _path_factors(self) -> dict[str, float]:
+        """Length of each muscle's scaled path over that of arm26, at 90 degrees [-]."""
+        if self.person.height == HEIGHT_0 and self.person.sex == "male":
+            return dict.fromkeys(MUSCLES, 1.0)
+        return {name: self.muscle_geometry(name, radians(90.0))[0] / x for name, x in _path_lengths().items()}
 
     def inertia_about_elbow(self) -> float:
         """Generalised inertia of the forearm about the elbow axis [kg m^2]."""
@@ -229,12 +246,10 @@ class Arm:
         return float(self.axis @ np.cross(lever, s.mass * np.array(self.gravity)))
 
 
-@lru_cache(maxsize=64)
-def _path_factor(person: Person, muscle: str) -> float:
-    """Length of a scaled path over that of arm26, at 90 degrees [-]."""
-    if person.height == HEIGHT_0 and person.sex == "male":
-        return 1.0
-    return Arm(person).muscle_geometry(muscle, radians(90.0))[0] / Arm().muscle_geometry(muscle, radians(90.0))[0]
+@cache
+def _path_lengths() -> dict[str, float]:
+    """Of arm26's muscles at 90 degrees [m]."""
+    return {name: Arm().muscle_geometry(name, radians(90.0))[0] for name in MUSCLES}
 
 
 def excitation_name(muscle: str) -> str:

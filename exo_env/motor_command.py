@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -85,16 +86,7 @@ class InternalModel:
 
     def arm_table(self) -> ArmTable:
         """The arm for the compiled iteration."""
-        paths = [self.arm.path(m, welded=True) for m in MUSCLES]
-        points = [p for path in paths for p in path]
-        return ArmTable(
-            muscles=np.array([self.arm.muscle(m).numbers() for m in MUSCLES]),
-            first=np.cumsum([0, *(len(path) for path in paths)]),
-            moving=np.array([p.body == "forearm" for p in points]),
-            points=np.array([p.point for p in points]),
-            axis=np.ascontiguousarray(self.arm.axis),
-            elbow=np.ascontiguousarray(self.arm.elbow),
-        )
+        return _arm_table(self.arm)
 
     def load_table(self) -> LoadTable:
         """What it carries, for the compiled iteration."""
@@ -122,6 +114,21 @@ class InternalModel:
             muscle = self.arm.muscle(name)
             found += lever * muscle.tension(length, muscle.equilibrium(length, float(a)))
         return found
+
+
+@lru_cache(maxsize=2)
+def _arm_table(arm: Arm) -> ArmTable:
+    """Of one arm; several internal models share it."""
+    paths = [arm.path(m, welded=True) for m in MUSCLES]
+    points = [p for path in paths for p in path]
+    return ArmTable(
+        muscles=np.array([arm.muscle(m).numbers() for m in MUSCLES]),
+        first=np.cumsum([0, *(len(path) for path in paths)]),
+        moving=np.array([p.body == "forearm" for p in points]),
+        points=np.array([p.point for p in points]),
+        axis=np.ascontiguousarray(arm.axis),
+        elbow=np.ascontiguousarray(arm.elbow),
+    )
 
 
 def plan(model: InternalModel, reference: Course, duration: float) -> MotorCommand:

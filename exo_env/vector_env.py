@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -94,7 +93,9 @@ class ElbowLiftVectorEnv(VectorEnv):
         if mask is None:
             return np.ones(self.num_envs, bool)
         if not (isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
-            raise InputError(f"reset_mask = {mask!r}; booleans of shape ({self.num_envs},), one of them true, are wanted.")
+            raise InputError(
+                f"reset_mask = {mask!r}; {self.num_envs} booleans, one of them true, are wanted."
+            )
         if not self._started and not mask.all():
             raise gymnasium.error.ResetNeeded("The first reset() has to reset all worlds.")
         return mask
@@ -116,9 +117,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         self._over[i] = False
         return info
 
-    def step(
-        self, actions: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """A control period of every world.
 
         Args:
@@ -140,11 +139,11 @@ class ElbowLiftVectorEnv(VectorEnv):
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
         terminated = running & (status[:, STATUS.event] != NOTHING)
         truncated = running & (status[:, STATUS.step] == status[:, STATUS.steps])
-        infos = self._infos(running)
+        infos = self._infos(running) if running.any() else {}
         infos = self._autoreset(~running, infos)
         self._over = terminated | truncated
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
-            infos = self._same_step(np.flatnonzero(self._over), infos)
+            infos = self._same_step(self._over.copy(), infos)
         return self._batch.observations.copy(), rewards, terminated, truncated, infos
 
     def _checked(self, actions: Any) -> np.ndarray:
@@ -163,16 +162,15 @@ class ElbowLiftVectorEnv(VectorEnv):
             infos = self._add_info(infos, self._reset(i), i)
         return infos
 
-    def _same_step(self, ended: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
+    def _same_step(self, ended: np.ndarray, told: dict[str, Any]) -> dict[str, Any]:
         """Begin the episodes of worlds that ended one now; what they ended with is in final_obs and final_info."""
-        for i in ended:
-            final = {name: values[i] for name, values in infos.items() if not name.startswith("_") and name in _PLAIN}
-            final["reward_terms"] = {name: infos["reward_terms"][name][i] for name in TERMS}
-            final["reward_weights"] = {name: infos["reward_weights"][name][i] for name in TERMS}
-            if "event" in infos and infos["_event"][i]:
-                final["event"] = infos["event"][i]
-            last = self._batch.observations[i].copy()
-            infos = self._add_info(infos, {"final_obs": last, "final_info": final}, i)
+        last, infos = self._batch.observations.copy(), self._infos(~ended) if not ended.all() else {}
+        for i in np.flatnonzero(ended):
+            final = {name: told[name][i] for name in _PLAIN}
+            final |= {group: {name: told[group][name][i] for name in TERMS} for group in _GROUPED}
+            if "event" in told and told["_event"][i]:
+                final["event"] = told["event"][i]
+            infos = self._add_info(infos, {"final_obs": last[i], "final_info": final}, i)
             infos = self._add_info(infos, self._reset(i), i)
         return infos
 
@@ -213,3 +211,5 @@ class ElbowLiftVectorEnv(VectorEnv):
 
 _PLAIN = ("time", "tracking_error_deg", "device_share", "effort", "elbow_reaction", "solver_failed")
 """Infos of a step that are one number a world."""
+_GROUPED = ("reward_terms", "reward_weights")
+"""Infos of a step that are one number a world and term."""

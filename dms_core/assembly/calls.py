@@ -7,6 +7,7 @@ element that exists or that a user writes later.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from numba import types
@@ -23,6 +24,12 @@ def address(kernel: Any, signature: Any, who: str) -> int:
     """Compile `kernel` for `signature` (or load it from numba's cache) and give the address of its code."""
     if not hasattr(kernel, "compile"):
         raise ModelError(f"{who}: its kernel is {kernel!r}; a function decorated with numba.njit is wanted.")
+    return _address(kernel, signature)
+
+
+@cache
+def _address(kernel: Any, signature: Any) -> int:
+    """As above; asking numba again takes longer than a step."""
     kernel.compile(signature)
     compiled = kernel.get_compile_result(signature)
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

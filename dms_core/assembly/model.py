@@ -250,11 +250,13 @@ class Model:
 
     def _with_orders_of(self, like: Model) -> Tables:
         """Tables with this model's numbers and the other's scatter and elimination orders."""
-        dynamics, constraints = self._solved_calls()
+        known = like.tables.values
+        dynamics = self._dynamics.values._replace(moving=known.dynamics.moving)
+        constraints = self._constraints.values._replace(moving=known.constraints.moving)
         scales = np.array([(c.scale, c.rate_scale) for c in self.layout.coordinates])
         changed: dict[str, Any] = {"dynamics": dynamics, "constraints": constraints, "sensors": self._sensors.values}
         changed |= {"scale_q": np.ascontiguousarray(scales[:, 0]), "scale_v": np.ascontiguousarray(scales[:, 1])}
-        return Tables(**{**like.tables.values._asdict(), **changed})
+        return Tables(**{**known._asdict(), **changed})
 
     def _samples(self, work: Work, size: int, evaluate: Callable[[np.ndarray], None]) -> list[np.ndarray]:
         """Matrix entries at the state in `work` and at nearby ones, where they are finite."""

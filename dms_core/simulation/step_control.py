@@ -151,8 +151,8 @@ def resize(h, error, iterations):
 
 
 @compiled
-def one_step(m, s, o, stop):
-    """Attempts until one step is accepted; gives DONE or what went wrong."""
+def one_step(m, s, o, stop, kept):
+    """Attempts until one step is accepted; gives DONE or what went wrong. `kept`: the step is recorded."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
     started, equal = count[RESTART] == 1 or o.one_step == 1, o.one_step == 1 and not fixed
     set_weights(m, s, o)
@@ -184,7 +184,8 @@ def one_step(m, s, o, stop):
     accept(s, h, c0, started)
     # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2.
     if o.one_step == 1:
-        if not stage_rates(m, s):
+        # Between two landings only a record wants them.
+        if (kept or h == rest) and not stage_rates(m, s):
             return RATES_FAILED
     elif started:
         consistent_rates(m, s)
@@ -230,7 +231,7 @@ def advance(m, s, o, t_end, record, recorded):
             if kept:
                 record_point(s, record, recorded)
                 recorded += 1
-        code = one_step(m, s, o, next_stop(s, t_end))
+        code = one_step(m, s, o, next_stop(s, t_end), kept)
         if code != DONE:
             return code, recorded
         if kept:
