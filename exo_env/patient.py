@@ -23,7 +23,9 @@ distribution.
     [Wolbrecht 2008]  IEEE Trans. Neural Syst. Rehabil. Eng. 16:286-297: people after stroke let the robot do the work
 
 Most of these numbers stand in the abstracts. Not checked against the papers themselves: the elbow's rates of
-[Frey-Law 2012], the latency of [Hammond 1955]; the rates of [Rakshit 2021] are those that MyoSuite quotes from it.
+[Frey-Law 2012], which lie between those of ankle and shoulder in its abstract, the latency of [Hammond 1955], the
+forgetting factors of [Emken 2007] and the time constants of [Smith 2018], of which the abstracts give the laws without
+numbers; the rates of [Rakshit 2021] are those that MyoSuite quotes from it.
 """
 
 from __future__ import annotations
