@@ -166,8 +166,8 @@ class ElbowLiftVectorEnv(VectorEnv):
         """Begin the episodes of worlds that ended one now; what they ended with is in final_obs and final_info."""
         last, infos = self._batch.observations.copy(), self._infos(~ended) if not ended.all() else {}
         for i in np.flatnonzero(ended):
-            final = {name: told[name][i] for name in _PLAIN}
-            final |= {group: {name: told[group][name][i] for name in TERMS} for group in _GROUPED}
+            final = {name: told[name][i].item() for name in _PLAIN}
+            final |= {group: {name: told[group][name][i].item() for name in TERMS} for group in _GROUPED}
             if "event" in told and told["_event"][i]:
                 final["event"] = told["event"][i]
             infos = self._add_info(infos, {"final_obs": last[i], "final_info": final}, i)
