@@ -2,6 +2,7 @@
 
 python -m agents evaluate --policy NAME [NAME ...] --population NAME --patients N --seed S --out DIR
 python -m agents policies
+python -m agents tune-baselines [--tries N] [--patients N] [--workers N] [--out DIR]
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from agents.baselines import POLICIES, policy
 from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
 from agents.figure import draw, require_matplotlib
+from agents.tune_command import tune_baselines
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, write_json
@@ -80,7 +82,7 @@ def _json(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"evaluate": evaluate, "policies": policies},
+        {"evaluate": evaluate, "policies": policies, "tune-baselines": tune_baselines},
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",
         arguments,

@@ -2,8 +2,11 @@
 
 none              both ropes slack; at the start the agonist still holds the arm, and lets go as fast as it can
 pid               the paper's PID: the device's own controller, full authority, the reference as its setpoint
-pid_compensated   the same with the tension that arm, device and load need, see compensation.py
+pid_yielding      the same with part of the authority, behind the reference by a constant angle, see yielding.py
+pid_compensated   such a one with part of the tension that arm, device and load need, see compensation.py
 assist_as_needed  learns that tension and forgets it, see assist_as_needed.py
+
+The last three have numbers of their own, tuned for return on the training population (tuning.py).
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from agents.assist_as_needed import AssistAsNeeded
 from agents.compensation import CompensatedPid
 from agents.policy import Policy
+from agents.yielding import YieldingPid
 from dms_core.errors import InputError, choices
 
 
@@ -45,7 +49,9 @@ class PidControl(Policy):
         return np.array([0.0, 1.0])
 
 
-POLICIES: dict[str, type[Policy]] = {p.name: p for p in (NoAssistance, PidControl, CompensatedPid, AssistAsNeeded)}
+POLICIES: dict[str, type[Policy]] = {
+    p.name: p for p in (NoAssistance, PidControl, YieldingPid, CompensatedPid, AssistAsNeeded)
+}
 
 
 def policy(name: str) -> Policy:

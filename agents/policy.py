@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
+from agents.tuned import Range
+
 
 class Policy(ABC):
     """What acts in exo/ElbowLift-v0."""
@@ -18,6 +20,8 @@ class Policy(ABC):
     """Of the environment it acts in."""
     observation: ClassVar[tuple[str, ...]] = ("device",)
     """Groups that it sees."""
+    ranges: ClassVar[dict[str, Range]] = {}
+    """Where its numbers may lie, which `python -m agents tune-baselines` searches; arguments of its constructor."""
 
     @abstractmethod
     def reset(self, env: gymnasium.Env) -> None:

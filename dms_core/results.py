@@ -85,9 +85,15 @@ class Trajectory:
         self.result, self.stats, self.message = result, stats, message
 
     @cached_property
+    def _whole_lam(self) -> np.ndarray:
+        """Multipliers with those of welded bodies, which a step does not solve for."""
+        behind = _behind_jumps(self.t)
+        return self.model.whole_multipliers(self.signals, self.t, self.q, self.v, self.a, self._lam, behind)
+
+    @cached_property
     def lam(self) -> np.ndarray:
         """Multipliers, shape (n, n_phi); computed when asked for, as making them unique takes longer than a step."""
-        return self.model.unique_multipliers(self.q, self._lam)
+        return self.model.unique_multipliers(self.q, self._whole_lam)
 
     @property
     def success(self) -> bool:
@@ -127,8 +133,8 @@ class Trajectory:
         second = self.model.second_order
         q, slope_q, _ = _hermite(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
         v, slope_v, _ = _hermite(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
-        unique = self.model.unique_multipliers
-        lam = (1.0 - x) * unique(self.q[start], self._lam[start]) + x * unique(self.q[end], self._lam[end])
+        unique, whole = self.model.unique_multipliers, self._whole_lam
+        lam = (1.0 - x) * unique(self.q[start], whole[start]) + x * unique(self.q[end], whole[end])
         mu = (1.0 - x) * self.mu[start] + x * self.mu[end]
         v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
         return States(self.model, self.signals, times, q, v, a, lam, mu)

@@ -3,16 +3,18 @@
 For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activations a_k of the motor command:
 
     c_k = delayed(s a_k, neural delay) + sign feedback_gain delayed(e, feedback delay)     what is intended, at least 0
-    T_k = c_k + co_contraction mean(c of the other group)                                  wanted share, at most 1
+    T_k = (c_k + co_contraction mean(c of the other group)) / maximum_activation_g         wanted share, at most 1
     d_k = maximum_activation_g min(T_k, 1 - M_F,k)                                         voluntary drive
           + spasticity_g delayed(max(stretch rate - threshold, 0), stretch delay)          stretch reflex
           + sign tremor_amplitude sin(phase)                                               tremor
     u_k = delayed(d_k, electromechanical delay), within 0.01 to 1
 
-s is the effort (slacking.py), M_F the fatigued share (fatigue.py). Weakness is of the descending command: reflex and
-tremor are not scaled by it. The flexors are stretched by extension of the elbow, the extensors by flexion. Tremor
-alternates between the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a
-spectral peak of that width at half height.
+s is the effort (slacking.py), M_F the fatigued share (fatigue.py). Weakness is a ceiling, since what was measured after
+stroke is the largest torque: who is weak wants a larger share of what is left for the same moment, and gives it up to
+all of it. That patients know their weakness so well is assumed; the rest of it they learn by their errors (s above 1).
+Weakness is of the descending command: reflex and tremor know no ceiling. The flexors are stretched by extension of the
+elbow, the extensors by flexion. Tremor alternates between the groups and its phase wanders with
+2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of that width at half height.
 
 All signals are held over a period, so a delay that is no multiple of it takes the mean of the delayed signal over the
 period: linear interpolation between two samples. One patient is one row of numbers (`PATIENT` in patient.py) and one
@@ -110,7 +112,9 @@ def wanted_share(par, state, n, period, k):
                 others += intended(par, state, n, period, j)
                 count += 1
         others *= par[PATIENT.co_contraction] / count
-    return min(intended(par, state, n, period, k) + others, 1.0)
+    wanted = intended(par, state, n, period, k) + others
+    maximum = par[PATIENT.maximum_activation_flexors if SIGN[k] > 0.0 else PATIENT.maximum_activation_extensors]
+    return wanted / maximum if wanted < maximum else 1.0
 
 
 @njit(cache=True)
@@ -152,7 +156,7 @@ def remember(par, state, n, wanted, error, stretch):
 
 
 @njit(cache=True)
-def step_effort(par, state, n, period, wanted, error, stretch, share, noise, out):
+def step_effort(par, state, n, period, wanted, error, stretch, noise, out):
     """One control period of one patient.
 
     Args:
@@ -163,7 +167,6 @@ def step_effort(par, state, n, period, wanted, error, stretch, share, noise, out
         wanted: activations of the motor command [-], shape (6,).
         error: psi - theta [rad].
         stretch: rate at which each muscle is stretched, as rate of the elbow [rad/s], shape (6,).
-        share: of the work, that the device carries [-].
         noise: a standard normal number for the tremor.
         out: excitations over this period [-], shape (6,).
     """
@@ -184,8 +187,8 @@ def step_effort(par, state, n, period, wanted, error, stretch, share, noise, out
     wandering = math.sqrt(2.0 * math.pi * par[PATIENT.tremor_width] * period) * noise
     state[STATE.phase] = (state[STATE.phase] + turn + wandering) % (2.0 * math.pi)
     state[STATE.effort] = advance_effort(
-        state[STATE.effort], error, share, par[PATIENT.slacking_rate], par[PATIENT.slacking_tolerance],
-        par[PATIENT.effort_recovery], par[PATIENT.least_effort], period,
+        state[STATE.effort], error, par[PATIENT.slacking_rate], par[PATIENT.effort_recovery],
+        par[PATIENT.least_effort], period,
     )  # fmt: skip
 
 
@@ -224,27 +227,26 @@ class Effort:
         drive = self.state[STATE.memory + RING.drive * self._samples :: self._samples][:N]
         return np.clip(drive, MINIMUM, 1.0)
 
-    def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0, share: float = 0.0) -> np.ndarray:
+    def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0) -> np.ndarray:
         """Excitations over the coming control period [-], shape (6,).
 
         Args:
             wanted: activations of the motor command now [-], shape (6,), in the order of MUSCLES.
             error: psi - theta now [rad].
             rate: of the elbow now [rad/s], flexion positive.
-            share: of the work that the device carries, 0 to 1 [-]; beyond that it counts as 0 or 1.
 
         Raises:
             InputError: a value is not finite, or `wanted` is not six numbers from 0 to 1.
         """
-        for name, value in (("error", error), ("rate", rate), ("share", share)):
+        for name, value in (("error", error), ("rate", rate)):
             if not math.isfinite(value):
                 raise InputError(f"{name} = {value}; a finite number is wanted.")
         out = np.empty(N)
         stretch = -rate * np.array(SIGN)
         noise = self.generator.standard_normal()
         step_effort(
-            self.numbers, self.state, self._samples, self.period, _activations(wanted), float(error), stretch,
-            float(share), noise, out,
+            self.numbers, self.state, self._samples, self.period, _activations(wanted), float(error), stretch, noise,
+            out,
         )  # fmt: skip
         return out
 

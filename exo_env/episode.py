@@ -16,12 +16,12 @@ from dms_core import Model, SolverOptions
 from dms_core.model import Constant
 from dms_core.simulation.dynamics import World
 from exo_env.actions import DRIVES, Drive, drive_inputs
-from exo_env.command_kernel import path_geometry
 from exo_env.ecosystem import Ecosystem
 from exo_env.effort import Effort
 from exo_env.exoskeleton import AGONIST, WornExoskeleton
 from exo_env.human import MUSCLES, Arm, excitation_name
 from exo_env.motor_command import InternalModel, MotorCommand, plan_course
+from exo_env.need import Need
 from exo_env.patient import Patient
 from exo_env.repetition import Repetition
 
@@ -82,6 +82,8 @@ class Episode:
         self.worn = WornExoskeleton(ecosystem.device, self.arm, ecosystem.misalignment, ecosystem.guide)
         self.times = np.arange(round(duration / period) + 1) * period
         self.wanted = self._wanted(duration)
+        known, course = self._known(self.ecosystem.weight), repetition.course(self.times)
+        self.need = Need.of(patient, known, ecosystem.device, course)
         self.effort = Effort(patient, period, generator)
         activations = self.effort.reset(self.wanted[0])
         self.held = drive.start(self._holding_tension(start, activations))
@@ -124,16 +126,9 @@ class Episode:
 
     def _holding_tension(self, start: float, activations: np.ndarray) -> float:
         """Agonist tension with which the arm rests at the start [N]; below 0 where the patient needs no help."""
-        known = self._known(self.ecosystem.weight)
-        needed, table = known.resting_moment(start), known.arm_table()
-        link, g = self.ecosystem.device.lower_link, float(np.linalg.norm(self.arm.gravity))
-        x, y, _ = link.centre_of_mass
-        needed += link.mass * g * (x * math.cos(start) - y * math.sin(start))
-        for k, (m, a) in enumerate(zip(MUSCLES, activations, strict=True)):
-            length, lever = path_geometry(table, k, start)
-            muscle = self.arm.muscle(m)
-            needed -= lever * muscle.tension(length, muscle.equilibrium(length, float(a)))
-        return needed / self.ecosystem.device.moment_arm(AGONIST, start)
+        known, device = self._known(self.ecosystem.weight), self.ecosystem.device
+        needed = known.resting_moment(start) + device.own_moment(start, float(np.linalg.norm(self.arm.gravity)))
+        return (needed - known.muscle_moment(start, activations)) / device.moment_arm(AGONIST, start)
 
     def advance(self, step: int, held: np.ndarray, excitations: np.ndarray) -> None:
         """Hold the inputs over the control period that begins at times[step]; see `world.result`."""

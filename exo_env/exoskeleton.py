@@ -108,6 +108,11 @@ class Exoskeleton(Settings):
         d = lower - np.array(ends.upper)
         return float(d[0] * lower[1] - d[1] * lower[0]) / float(np.linalg.norm(d))
 
+    def own_moment(self, angle: float, gravity: float) -> float:
+        """Moment that holds the lower link at a hinge angle [rad] [Nm]; gravity in m/s^2."""
+        x, y, _ = self.lower_link.centre_of_mass
+        return float(self.lower_link.mass * gravity * (x * np.cos(angle) - y * np.sin(angle)))
+
 
 def link_axes(arm: Arm) -> np.ndarray:
     """Axes x, y, z of an aligned link where the elbow is straight, as columns in ground axes, shape (3, 3)."""

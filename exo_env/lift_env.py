@@ -39,7 +39,7 @@ class ElbowLiftEnv(gymnasium.Env):
     differential-algebraic equations that advances with its own steps; one `step` holds an action for one control period
     (50 Hz). One episode is one repetition: rest, flexion, pause, return, of random amplitude, duration and pause, with
     a random patient and load. The patient is to do as much as possible, the device no more than is needed: effort
-    falls where the device does the work.
+    is forgotten where the device leaves no error.
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`. Numbers beyond -1 to 1 are clipped; a number that is not finite, or another shape, is
@@ -85,8 +85,8 @@ class ElbowLiftEnv(gymnasium.Env):
 
     | Term       | Value                                                    | Weight |
     |------------|----------------------------------------------------------|--------|
-    | tracking   | exp(-(error / 10 deg)^2)                                 | 1      |
-    | assistance | -abs(moment of the device) / 10 Nm, at least -2          | 0.5    |
+    | tracking   | exp(-(error / 5 deg)^2)                                  | 1      |
+    | assistance | -(moment of the device beyond need) / need, at least -2  | 0.75   |
     | smoothness | -mean square change of the action / 4                    | 0.2    |
     | reaction   | -(elbow reaction / 500 N - 1) beyond 500 N, at least -2  | 0.2    |
     | unsafe     | -1 where an event ends the episode                       | 100    |
@@ -95,7 +95,8 @@ class ElbowLiftEnv(gymnasium.Env):
     At rest on the reference, muscles as the patient's command wants them; with "rope_tension" the agonist holds what
     they do not. Patient, load (0.5 to 2 kg) and repetition are drawn from the environment's one generator.
     `reset(options={...})` fixes any of `patient`, `load` [kg], `reference` (fields of a repetition) and
-    `initial_angle_deg`; all else is drawn as without it. `info` of a reset holds what was drawn.
+    `initial_angle_deg`; all else is drawn as without it. `info` of a reset holds what was drawn, and `ability`, the
+    share of arm and load that the patient can hold (`exo_env/need.py`).
 
     ## Episode End
     Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
@@ -273,7 +274,7 @@ class ElbowLiftEnv(gymnasium.Env):
         if self._over:
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
         k, before, true = self._step, self._action, self._readout
-        excitations = episode.effort.step(episode.wanted[k], error=-true.error, rate=true.rate, share=true.share)
+        excitations = episode.effort.step(episode.wanted[k], error=-true.error, rate=true.rate)
         episode.advance(k, self.drive.held(used, episode.held, self.period), excitations)
         self._step, self._action, self._result = k + 1, used, episode.world.result
         happened = self._failure()
@@ -282,7 +283,8 @@ class ElbowLiftEnv(gymnasium.Env):
             self._last = self.observer.observe(true.channels(used), self.np_random, first=False)
             happened = event(self.limits, true.angle, true.tensions, true.reaction)
         found = rewards.terms(
-            error=true.error, moment=true.exo_moment, reaction=true.reaction, action=used, before=before,
+            error=true.error, moment=true.exo_moment, lacking=float(episode.need.lacking[k + 1]),
+            scale=episode.need.scale, reaction=true.reaction, action=used, before=before,
             unsafe=happened is not None,
         )  # fmt: skip
         terminated, truncated = happened is not None, k + 1 == len(episode.times) - 1
@@ -316,6 +318,7 @@ class ElbowLiftEnv(gymnasium.Env):
         return {
             "patient": e.patient.model_dump(),
             "load": float(e.ecosystem.weight),
+            "ability": e.need.ability,
             "reference": e.repetition.model_dump(),
             "initial_angle_deg": math.degrees(self._readout.angle),
         }

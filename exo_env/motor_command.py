@@ -28,7 +28,7 @@ import numpy as np
 from dms_core.errors import InputError
 from dms_core.model import Spline
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.command_kernel import ArmTable, LoadTable, needed_moment, planned
+from exo_env.command_kernel import ArmTable, LoadTable, needed_moment, path_geometry, planned
 from exo_env.gym_machine import GymMachine
 from exo_env.human import MUSCLES, Arm
 
@@ -113,6 +113,15 @@ class InternalModel:
     def resting_moment(self, flexion: float) -> float:
         """Moment that must be given about the elbow to hold arm and load at rest [Nm]."""
         return needed_moment(self.arm_table(), self.load_table(), flexion, 0.0, 0.0)
+
+    def muscle_moment(self, flexion: float, activations: np.ndarray) -> float:
+        """Moment that the muscles give about the elbow at rest [Nm]; activations [-], shape (6,), at least 0.01."""
+        found, table = 0.0, self.arm_table()
+        for k, (name, a) in enumerate(zip(MUSCLES, activations, strict=True)):
+            length, lever = path_geometry(table, k, flexion)
+            muscle = self.arm.muscle(name)
+            found += lever * muscle.tension(length, muscle.equilibrium(length, float(a)))
+        return found
 
 
 def plan(model: InternalModel, reference: Course, duration: float) -> MotorCommand:

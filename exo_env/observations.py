@@ -17,6 +17,7 @@ from dms_core.errors import InputError, choices
 from exo_env.human import MUSCLES
 from exo_env.patient import PATIENT, Patient
 from exo_env.settings import Settings
+from exo_env.slacking import MOST_EFFORT
 
 PREVIEW = (0.1, 0.2, 0.4)
 """How far ahead the reference is shown [s]; assumed."""
@@ -85,7 +86,7 @@ def patient_channels() -> list[Channel]:
 UNITS = {
     "neural_delay": "s", "electromechanical_delay": "s", "spasticity_flexors": "s/rad", "spasticity_extensors": "s/rad",
     "stretch_threshold": "rad/s", "stretch_delay": "s", "tremor_frequency": "Hz", "tremor_width": "Hz",
-    "fatigue_rate": "1/s", "recovery_rate": "1/s", "slacking_rate": "1/s", "slacking_tolerance": "rad",
+    "fatigue_rate": "1/s", "recovery_rate": "1/s", "slacking_rate": "1/s",
     "effort_recovery": "1/(s rad)", "feedback_gain": "1/rad", "feedback_delay": "s", "body_mass": "kg", "height": "m",
 }  # fmt: skip
 
@@ -108,7 +109,7 @@ GROUPS: dict[str, list[Channel]] = {
         Channel("load", "kg", 1.0, 0.0, 50.0),
         Channel("muscle_force", "N", 500.0, 0.0, 10000.0, MUSCLES),
         Channel("fatigued", "-", 1.0, 0.0, 1.0, MUSCLES),
-        Channel("effort", "-", 1.0, 0.0, 1.0),
+        Channel("effort", "-", 1.0, 0.0, MOST_EFFORT),
         Channel("device_share", "-", 1.0, 0.0, 1.0),
     ],
 }

@@ -19,6 +19,7 @@ distribution.
     [McPherson 2018]  Exp. Brain Res. 237:121-135: elbow stretch reflex in hemiparesis, stretches of 15 to 150 deg/s
     [Mercier 2004]    Clin. Rehabil. 18:215-221: relative strength of five muscle groups of the paretic arm
     [Rakshit 2021]    doi:10.1016/j.jbiomech.2021.110695: fatigue and recovery rates by muscle group and sex
+    [Smith 2018]      J. Neurophysiol., doi:10.1152/jn.00700.2017: force decays while the shown error is held at zero
     [Wolbrecht 2008]  IEEE Trans. Neural Syst. Rehabil. Eng. 16:286-297: people after stroke let the robot do the work
 
 Most of these numbers stand in the abstracts. Not checked against the papers themselves: the elbow's rates of
@@ -48,8 +49,8 @@ class Patient(Settings):
     strength: float = Field(default=1.0, gt=0.0, le=5.0, description="factor on every muscle's F0 [-]; assumed")
     maximum_activation_flexors: float = Field(
         default=1.0, ge=0.0, le=1.0,
-        description="share of the flexors that effort can activate [-]; stroke: torque of the more affected side 44 % "
-        "below healthy [Bowden 2014], half of healthy six weeks after [Canning 1999]",
+        description="share of the flexors that effort can activate [-], a ceiling; stroke: torque of the more affected "
+        "side 44 % below healthy [Bowden 2014], half of healthy six weeks after [Canning 1999]",
     )  # fmt: skip
     maximum_activation_extensors: float = Field(
         default=1.0, ge=0.0, le=1.0,
@@ -122,18 +123,16 @@ class Patient(Settings):
     )
     slacking_rate: float = Field(
         default=0.0, ge=0.0, le=10.0,
-        description="rate at which effort is forgotten while the device carries all and the error is small [1/s]; that "
-        "it is: [Emken 2007], [Wolbrecht 2008]; value assumed",
+        description="rate at which effort is forgotten [1/s]; that it is, all the time and in proportion: from "
+        "movement to movement [Emken 2007], within one [Smith 2018]; value assumed",
     )  # fmt: skip
-    slacking_tolerance: float = Field(
-        default=0.1, gt=0.0, le=1.0, description="error from which effort is no longer forgotten [rad]; assumed"
-    )
     effort_recovery: float = Field(
-        default=5.0, ge=0.0, le=100.0,
-        description="rate at which effort returns per error beyond the tolerance [1/(s rad)]; assumed",
+        default=0.0, ge=0.0, le=100.0,
+        description="rate at which effort is recruited per tracking error [1/(s rad)]; that errors of any size do it: "
+        "[Emken 2007]; value assumed",
     )  # fmt: skip
     least_effort: float = Field(
-        default=0.0, ge=0.0, le=1.0, description="share of the command to which effort can fall [-]; assumed"
+        default=0.0, ge=0.0, le=1.0, description="share of the command at which forgetting ends [-]; assumed"
     )
     feedback_gain: float = Field(
         default=0.0, ge=0.0, le=5.0,
@@ -184,11 +183,10 @@ class PatientIndex(NamedTuple):
     rest_recovery: int = 14
     fatigued_at_start: int = 15
     slacking_rate: int = 16
-    slacking_tolerance: int = 17
-    effort_recovery: int = 18
-    least_effort: int = 19
-    feedback_gain: int = 20
-    feedback_delay: int = 21
+    effort_recovery: int = 17
+    least_effort: int = 18
+    feedback_gain: int = 19
+    feedback_delay: int = 20
 
 
 PATIENT = PatientIndex()

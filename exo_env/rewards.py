@@ -1,21 +1,26 @@
 """The reward: named terms between about -1 and 1, times weights; each is in `info`, so that none hides in the sum.
 
-    tracking     exp(-(e / 10 deg)^2)
-                 1 on the reference. 10 deg is the maximal error of a clinical goniometer at the elbow (Chapleau et al.
-                 2011, Clin. Orthop. Relat. Res. 469:3134-3140): what a therapist cannot tell from the reference costs
-                 little, and what everybody sees earns nothing.
-    assistance   -|M_exo| / 10 Nm, at least -2
-                 The device's moment. People after stroke let a robot do the work (Wolbrecht et al. 2008, IEEE TNSRE
-                 16:286-297), so help is to be given no more than is needed. 10 Nm is about twice what 1 kg and the
-                 forearm need; assumed.
+    tracking     exp(-(e / 5 deg)^2)
+                 1 on the reference. One reading of the elbow by a goniometer spreads by 2.4 to 3.4 deg (Fish and
+                 Wingate 1985, Phys. Ther. 65:1666-1670), so 95 % of readings lie within 4.7 to 6.7 deg: what a
+                 therapist cannot tell from the reference costs little, and what everybody sees earns nothing.
+    assistance   -max(M_exo - M_lack, -M_exo, 0) / mean M_need, at least -2
+                 The device's moment beyond what this patient lacks (need.py): 0 for help that is needed, about -1 where
+                 the device does all for somebody who needs nothing, and less where it pulls down. People after stroke
+                 let a robot do the work (Wolbrecht et al. 2008, IEEE TNSRE 16:286-297), and slacking is what training
+                 by robots loses most by (Reinkensmeyer et al. 2009, doi:10.1109/IEMBS.2009.5333978): the patient is to
+                 do what the patient can. Who can do nothing is helped for nothing.
     smoothness   -mean((a - a_before)^2) / 4
                  -1 for an action that jumps from end to end; assumed.
     reaction     -max(F / 500 N - 1, 0), at least -2
                  Elbow reaction above that of quiet lifting, which pulling against oneself causes; assumed.
     unsafe       -1 once, where an event ends the episode, see events.py
 
-With the default weights a second of good tracking is worth 50, a second of 10 Nm of help costs 25, and an unsafe event
-100: two seconds of tracking beside what is lost by the end of the episode. The weights are assumed.
+The most that a step can earn is 1, a followed reference without a newton too much: 300 in an episode of 6 s. With the
+default weights a robot that does everything for somebody who needs nothing still earns a quarter of that, more than an
+arm that hangs; half of such help costs as much as a constant error of 3.4 deg, the spread of a therapist's reading. An
+unsafe event costs as much as two seconds of the best, beside what is lost by the end of the episode. The weights are
+assumed.
 """
 
 from __future__ import annotations
@@ -27,30 +32,40 @@ from pydantic import Field
 
 from exo_env.settings import Settings
 
-TRACKING_WIDTH = math.radians(10.0)
+TRACKING_WIDTH = math.radians(5.0)
 """Error that earns 1/e [rad]."""
-LARGE_MOMENT, REACTION_THRESHOLD, MOST = 10.0, 500.0, 2.0
-"""[Nm], [N], and the largest cost of assistance and reaction [-]."""
+REACTION_THRESHOLD, MOST = 500.0, 2.0
+"""[N], and the largest cost of assistance and reaction [-]."""
 
 
 class Weights(Settings):
     """Factor on each term."""
 
     tracking: float = Field(default=1.0, ge=0.0, le=1e6)
-    assistance: float = Field(default=0.5, ge=0.0, le=1e6)
+    assistance: float = Field(default=0.75, ge=0.0, le=1e6)
     smoothness: float = Field(default=0.2, ge=0.0, le=1e6)
     reaction: float = Field(default=0.2, ge=0.0, le=1e6)
     unsafe: float = Field(default=100.0, ge=0.0, le=1e6)
 
 
 def terms(
-    *, error: float, moment: float, reaction: float, action: np.ndarray, before: np.ndarray, unsafe: bool
+    *,
+    error: float,
+    moment: float,
+    lacking: float,
+    scale: float,
+    reaction: float,
+    action: np.ndarray,
+    before: np.ndarray,
+    unsafe: bool,
 ) -> dict[str, float]:
     """Value of each term [-].
 
     Args:
         error: elbow angle minus reference [rad].
-        moment: of the exoskeleton [Nm].
+        moment: of the exoskeleton, flexion positive [Nm].
+        lacking: what the patient cannot give, at least 0 [Nm].
+        scale: mean moment that the movement needs [Nm].
         reaction: size of the elbow's reaction force [N].
         action: now, shape (2,).
         before: the action before, shape (2,).
@@ -58,7 +73,7 @@ def terms(
     """
     return {
         "tracking": math.exp(-((error / TRACKING_WIDTH) ** 2)),
-        "assistance": -min(abs(moment) / LARGE_MOMENT, MOST),
+        "assistance": -min(max(moment - lacking, -moment, 0.0) / scale, MOST),
         "smoothness": -0.25 * float(np.mean((action - before) ** 2)),
         "reaction": -min(max(reaction / REACTION_THRESHOLD - 1.0, 0.0), MOST),
         "unsafe": -1.0 if unsafe else 0.0,

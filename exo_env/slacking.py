@@ -1,18 +1,21 @@
-"""Slacking: a patient does less when the device does the work and nothing is lost by it.
+"""Slacking: effort is forgotten all the time, and every error recruits it.
 
-Emken et al. (2007, J. Neurophysiol. 97:3997-4006) found effort from one movement to the next to be f u + g e with a
-forgetting factor f < 1; Reinkensmeyer, Wolbrecht and Bobrow (2007, doi:10.1109/IEMBS.2007.4353215) and Wolbrecht et
-al. (2008, IEEE TNSRE 16:286-297) found the same of people after stroke in a robot that lifts their arm. Here
-with a rate, for the effort s as a share of the command:
+Emken et al. (2007, J. Neurophysiol. 97:3997-4006) derive and fit, for the effort u and the error x of one movement
+after another,
 
-    s' = -A (s - s_0) + B (1 - s)
-    A = rate w(e) share,   w = 1 for e <= 0, 1 - e / tolerance below the tolerance, 0 beyond
-    B = recovery max(e - tolerance, 0)
+    u_{i+1} = f u_i + g x_i,   f < 1
 
-e = psi - theta is the error by which the arm hangs back; `share` what the device carries of the work. Published
-forgetting is on at all times; that it is in proportion to the device's share is assumed, so that a patient without a
-device does what was planned. The tolerance is assumed too, after the error weighting of the robot of Emken, Benitez
-and Reinkensmeyer (2007, J. NeuroEng. Rehabil. 4:8), which disregards natural variability.
+as the greedy minimum of error and effort: there is no error too small to count, and forgetting never pauses. Smith,
+Rowe and Reinkensmeyer (2018, J. Neurophysiol., doi:10.1152/jn.00700.2017) find the same within a movement: while the
+shown error is held at zero, force decays exponentially from 0.25 s on, at a rate in proportion to the force, "until
+visual error prompts correction". So with a rate, for the effort s as a multiple of what was planned:
+
+    s' = -rate (s - s_0) + recovery e,   0 <= s <= 2
+
+e = psi - theta is the error by which the arm hangs back; one that is ahead lowers the effort. rate = -ln(f) / T and
+recovery = g / T for movements of duration T. Effort s rests where e = rate (s - s_0) / recovery: a patient alone hangs
+back by that much, and a device that leaves no error leaves no effort above s_0. That forgetting ends at s_0, and that
+effort ends at twice the plan, is assumed.
 """
 
 from __future__ import annotations
@@ -21,15 +24,16 @@ import math
 
 from numba import njit
 
+MOST_EFFORT = 2.0
+"""Largest multiple of what was planned [-]."""
+
 
 @njit(cache=True)
-def advance_effort(effort, error, share, rate, tolerance, recovery, least, duration):
-    """Effort s after a time [s] under a constant error [rad] and share of the device [-]; exact."""
-    small = min(max(1.0 - error / tolerance, 0.0), 1.0)
-    forgetting = rate * small * min(max(share, 0.0), 1.0)
-    returning = recovery * max(error - tolerance, 0.0)
-    speed = forgetting + returning
-    if speed <= 0.0:
-        return effort
-    rest = (forgetting * least + returning) / speed
-    return rest + (effort - rest) * math.exp(-speed * duration)
+def advance_effort(effort, error, rate, recovery, least, duration):
+    """Effort s after a time [s] under a constant error [rad]; exact within the limits."""
+    if rate > 0.0:
+        rest = least + recovery * error / rate
+        after = rest + (effort - rest) * math.exp(-rate * duration)
+    else:
+        after = effort + recovery * error * duration
+    return min(max(after, 0.0), MOST_EFFORT)

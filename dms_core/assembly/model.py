@@ -20,7 +20,8 @@ from dms_core.assembly.residual import (
 )
 from dms_core.assembly.sensing import Partials, composition, evaluate_partials, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
-from dms_core.assembly.tables import Signals, Work, all_calls, new_work, signal_tables
+from dms_core.assembly.tables import Calls, Signals, Work, all_calls, moving_calls, new_work, signal_tables
+from dms_core.assembly.welds import Welds, find_welds, recover
 from dms_core.compilation import announce
 from dms_core.errors import ModelError
 from dms_core.linear.lu import assemble as assemble_lu
@@ -141,22 +142,36 @@ class Model:
         self.start: Start = assemble(self, known.start if known is not None and reuse_rows else None)
         if known is not None and not np.array_equal(self.start.active, known.start.active):
             known = None
+        self._welds = Packed(find_welds(layout, self.start.active, self.constraint_jacobian(self.start.q)[2]))
+        self.start.v[self.welds.coordinates] = 0.0
         if known:
             self._tables = Packed(self._with_orders_of(known))
         else:
-            self._tables = Packed(self._order(self.start.active, self.start.q, self.start.v, 0.0))
+            self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0))
         self._composed = Packed(composition(layout))
         self._sensor_work = Packed(self.new_work())
+        read = {k for e in self._composed.values.constraint if e >= 0 for k in self._rows_of(e)}
+        self._reads_welds = bool(read & set(self.welds.rows))
+
+    def _rows_of(self, constraint: int) -> range:
+        """Rows of a constraint by its number."""
+        call = self.layout.constraints[constraint]
+        return range(call.row, call.row + call.rows)
 
     @property
     def active_rows(self) -> np.ndarray:
-        """Constraint rows that are solved for; the others follow from them."""
+        """Independent constraint rows; the others follow from them."""
         return self.start.active
 
     @property
     def redundant_rows(self) -> list[str]:
         """Names of constraint rows that the others imply."""
         return [self.layout.row_names[k] for k in self.start.redundant]
+
+    @property
+    def welds(self) -> Welds:
+        """What fixed joints hold on the ground; a step does not solve for it."""
+        return self._welds.values
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -183,20 +198,32 @@ class Model:
         Raises:
             ModelError: the equations are singular there.
         """
-        G = self.constraint_jacobian(q, v, t)[2]
-        active = independent_rows(G).independent
-        return Packed(self._order(active if len(active) >= len(self.start.active) else self.start.active, q, v, t))
+        calls = self.layout.constraints
+        moving = [calls[e] for e in moving_calls(calls, self.welds.free)]
+        rows = np.concatenate([np.arange(c.row, c.row + c.rows) for c in moving] + [np.zeros(0, int)]).astype(int)
+        G = self.constraint_jacobian(q, v, t)[2][np.ix_(rows, self.welds.free)]
+        found, solved = rows[independent_rows(G).independent], self.welds.solved
+        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t))
 
-    def _order(self, active: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) -> Tables:
+    def _solved_calls(self) -> tuple[Calls, Calls]:
+        """Dynamics and constraints, with the calls that a step has to evaluate."""
+        layout, free = self.layout, self.welds.free
+        return (
+            self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free)),
+            self._constraints.values._replace(moving=moving_calls(layout.constraints, free)),
+        )
+
+    def _order(self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) -> Tables:
         """Scatter and elimination orders of both linear systems, from their values at q, v."""
-        layout, active = self.layout, active.astype(np.int32)
+        layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         work = self.new_work()
         work.q[: self.n_q], work.v[: self.n_q] = q, v
-        w, dynamics, constraints = Packed(work), self._dynamics.table, self._constraints.table
+        calls = tuple(Packed(x) for x in self._solved_calls())
+        w, (dynamics, constraints) = Packed(work), (x.table for x in calls)
         evaluate_inputs(Packed(self._signals).table, t, False, w.table)
-        rows = [layout.row_names[k] for k in active]
-        names = [*(f"{n} (position)" for n in layout.names), *(f"{n} (velocity)" for n in layout.names)]
-        newton, slots = newton_pattern(layout, active)
+        rows, moving = [layout.row_names[k] for k in solved], [layout.names[k] for k in free]
+        names = [*(f"{n} (position)" for n in moving), *(f"{n} (velocity)" for n in moving)]
+        newton, slots = newton_pattern(layout, free, solved)
         packed = Packed(newton)
         newton, newton_lu = LinearSystem(
             newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
@@ -204,25 +231,25 @@ class Model:
             work, len(slots.number),
             lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x),
         ))  # fmt: skip
-        rates, slots = rate_pattern(layout, active)
+        rates, slots = rate_pattern(layout, free, solved)
         packed_rates = Packed(rates)
-        rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*layout.names, *rows]).best_order(
+        rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*moving, *rows]).best_order(
             self._samples(
                 work, len(slots.number), lambda x: evaluate_rates(dynamics, constraints, packed_rates.table, w.table, x)
             )
         )
         scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
-        calls = (self._dynamics.values, self._constraints.values, self._sensors.values)
         scale_q, scale_v = np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1])
         return Tables(
-            *calls, newton, newton_lu, rates, rate_lu, active, self.second_order, scale_q, scale_v, part_addresses()
-        )
+            *(x.values for x in calls), self._sensors.values, newton, newton_lu, rates, rate_lu, free, solved,
+            self.second_order, scale_q, scale_v, part_addresses(),
+        )  # fmt: skip
 
     def _with_orders_of(self, like: Model) -> Tables:
         """Tables with this model's numbers and the other's scatter and elimination orders."""
-        calls = {"dynamics": self._dynamics, "constraints": self._constraints, "sensors": self._sensors}
+        dynamics, constraints = self._solved_calls()
         scales = np.array([(c.scale, c.rate_scale) for c in self.layout.coordinates])
-        changed: dict[str, Any] = {name: packed.values for name, packed in calls.items()}
+        changed: dict[str, Any] = {"dynamics": dynamics, "constraints": constraints, "sensors": self._sensors.values}
         changed |= {"scale_q": np.ascontiguousarray(scales[:, 0]), "scale_v": np.ascontiguousarray(scales[:, 1])}
         return Tables(**{**like.tables.values._asdict(), **changed})
 
@@ -234,8 +261,9 @@ class Model:
         for k in range(1 + NEARBY_STATES):
             values = np.zeros(size)
             if k > 0:
-                work.q[: self.n_q] = q[: self.n_q] + NEARBY * scales[:, 0] * rng.normal(size=self.n_q)
-                work.v[: self.n_q] = v[: self.n_q] + scales[:, 1] * rng.normal(size=self.n_q)
+                free = self.welds.free
+                work.q[free] = q[free] + NEARBY * scales[free, 0] * rng.normal(size=len(free))
+                work.v[free] = v[free] + scales[free, 1] * rng.normal(size=len(free))
             evaluate(values)
             if k == 0 or np.isfinite(values).all():
                 samples.append(values)
@@ -274,6 +302,20 @@ class Model:
             unique[k : k + BATCH] = minimum_norms(G[:, :, : self.n_q], lam[k : k + BATCH])
         return unique
 
+    def whole_multipliers(self, signals: Signals, t, q, v, a, lam, behind) -> np.ndarray:  # noqa: ANN001
+        """Multipliers with those of welded bodies, which a run leaves 0, recovered; shape (k, n_phi)."""
+        if not len(self.welds.rows):
+            return lam
+        found = np.ascontiguousarray(lam).copy()
+        self._recover(Packed(signals).table, t, q, v, a, found, behind)
+        return found
+
+    def _recover(self, signals: np.ndarray, t, q, v, a, lam, behind) -> None:  # noqa: ANN001
+        recover(
+            self._dynamics.table, self._constraints.table, self._welds.table, signals, self._sensor_work.table, t, q, v,
+            a, lam, behind,
+        )  # fmt: skip
+
     def measure(self, signals: Signals, t, q, v, a, lam, behind) -> np.ndarray:  # noqa: ANN001
         """Sensors at given states with the given inputs: shape (k, n_y); behind[k] takes inputs behind a jump."""
         y = np.zeros((len(t), len(self.layout.outputs)))
@@ -281,7 +323,10 @@ class Model:
         return y
 
     def measure_into(self, world: np.ndarray, t, q, v, a, lam, behind, y) -> None:  # noqa: ANN001
-        """As `measure`, with the inputs of a packed world, into y."""
+        """As `measure`, with the inputs of a packed world, into y; reactions of welded bodies are recovered."""
+        if self._reads_welds:
+            lam = lam.copy()
+            self._recover(inner(world, STATE.signals), t, q, v, a, lam, behind)
         self._measure(inner(world, STATE.signals), t, q, v, a, lam, behind, y)
 
     def _measure(self, signals: np.ndarray, t, q, v, a, lam, behind, y) -> None:  # noqa: ANN001

@@ -171,8 +171,8 @@ def add_constraint_forces(calls, e, w, n):
 
 @compiled
 def evaluate_constraints(calls, w):
-    """phi and phi_q v + phi_t of all rows, without derivatives."""
-    for e in range(ints(calls, CALLS.kernel).shape[0]):
+    """phi and phi_q v + phi_t of the rows that are solved for, without derivatives."""
+    for e in ints(calls, CALLS.moving):
         n = evaluate_constraint(calls, e, w, 0)
         add_constraint_values(calls, e, w, n)
 
@@ -186,17 +186,35 @@ def _add_dynamic_rows(calls, e, w, n):
 
 
 @compiled
-def evaluate_residual(dynamics, constraints, w):
-    """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, without derivatives."""
+def _add_dynamic(calls, e, w):
+    """Call e into r2."""
+    n = evaluate_dynamic(calls, e, w, 0)
+    _add_dynamic_rows(calls, e, w, n)
+
+
+@compiled
+def _add_constraint(calls, e, w):
+    """Call e into phi, phi_v, r2 and gmu."""
+    n = evaluate_constraint(calls, e, w, 0)
+    add_constraint_values(calls, e, w, n)
+    add_constraint_forces(calls, e, w, n)
+
+
+@compiled
+def evaluate_residual(dynamics, constraints, w, whole):
+    """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, without derivatives; `whole`: of welded bodies too."""
     floats(w, WORK.r2)[:] = 0.0
     floats(w, WORK.gmu)[:] = 0.0
-    for e in range(ints(dynamics, CALLS.kernel).shape[0]):
-        n = evaluate_dynamic(dynamics, e, w, 0)
-        _add_dynamic_rows(dynamics, e, w, n)
-    for e in range(ints(constraints, CALLS.kernel).shape[0]):
-        n = evaluate_constraint(constraints, e, w, 0)
-        add_constraint_values(constraints, e, w, n)
-        add_constraint_forces(constraints, e, w, n)
+    if whole:
+        for e in range(ints(dynamics, CALLS.kernel).shape[0]):
+            _add_dynamic(dynamics, e, w)
+        for e in range(ints(constraints, CALLS.kernel).shape[0]):
+            _add_constraint(constraints, e, w)
+        return
+    for e in ints(dynamics, CALLS.moving):
+        _add_dynamic(dynamics, e, w)
+    for e in ints(constraints, CALLS.moving):
+        _add_constraint(constraints, e, w)
 
 
 @compiled
@@ -222,13 +240,13 @@ def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
     for i in range(minus.shape[0]):
         values[minus[i]] -= 1.0
         values[plus[i]] += 1.0
-    for e in range(ints(dynamics, CALLS.kernel).shape[0]):
+    for e in ints(dynamics, CALLS.moving):
         n = evaluate_dynamic(dynamics, e, w, 1)
         _add_dynamic_rows(dynamics, e, w, n)
         _scatter(inner(pattern, NEWTON.Jq), e, Jq, h * h, values)
         _scatter(inner(pattern, NEWTON.Jv), e, Jv, h, values)
         _scatter(inner(pattern, NEWTON.Ja), e, Ja, 1.0, values)
-    for e in range(ints(constraints, CALLS.kernel).shape[0]):
+    for e in ints(constraints, CALLS.moving):
         n = evaluate_constraint(constraints, e, w, 1)
         add_constraint_values(constraints, e, w, n)
         add_constraint_forces(constraints, e, w, n)
@@ -247,12 +265,12 @@ def evaluate_rates(dynamics, constraints, pattern, w, values):
     floats(w, WORK.gmu)[:] = 0.0
     values[:] = 0.0
     Jv, Ja, G = matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G)
-    for e in range(ints(dynamics, CALLS.kernel).shape[0]):
+    for e in ints(dynamics, CALLS.moving):
         n = evaluate_dynamic(dynamics, e, w, 1)
         _add_dynamic_rows(dynamics, e, w, n)
         _scatter(inner(pattern, RATES.Jv), e, Jv, 1.0, values)
         _scatter(inner(pattern, RATES.Ja), e, Ja, 1.0, values)
-    for e in range(ints(constraints, CALLS.kernel).shape[0]):
+    for e in ints(constraints, CALLS.moving):
         n = evaluate_constraint(constraints, e, w, 1)
         add_constraint_values(constraints, e, w, n)
         add_constraint_forces(constraints, e, w, n)

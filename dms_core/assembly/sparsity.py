@@ -115,25 +115,27 @@ def _constraint_blocks(call: Call) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 class _Index:
-    """Matrix rows and columns of coordinates and of active constraint rows; -1 for the ground and redundant rows."""
+    """Matrix rows and columns of what is solved for; -1 for ground and welded bodies, their rows, redundant rows."""
 
-    def __init__(self, layout: Layout, active: np.ndarray) -> None:
-        self.n = layout.n_q
+    def __init__(self, layout: Layout, free: np.ndarray, solved: np.ndarray) -> None:
+        self.of_coordinate = np.full(layout.n_q + 7, -1)
+        self.of_coordinate[free] = np.arange(len(free))
         self.of_row = np.full(layout.n_phi, -1)
-        self.of_row[active] = np.arange(len(active))
+        self.of_row[solved] = np.arange(len(solved))
 
     def coordinate(self, call: Call, offset: int) -> np.ndarray:
-        return np.where(call.iq < self.n, call.iq + offset, -1)
+        k = self.of_coordinate[call.iq]
+        return np.where(k >= 0, k + offset, -1)
 
     def row(self, call: Call, offset: int) -> np.ndarray:
         k = self.of_row[call.row : call.row + call.rows]
         return np.where(k >= 0, k + offset, -1)
 
 
-def newton_pattern(layout: Layout, active: np.ndarray) -> tuple[NewtonPattern, Slots]:
-    """Scatter of the Newton matrix of size 2 n_q + 2 len(active)."""
-    n, m = layout.n_q, len(active)
-    slots, at = Slots(), _Index(layout, active)
+def newton_pattern(layout: Layout, free: np.ndarray, solved: np.ndarray) -> tuple[NewtonPattern, Slots]:
+    """Scatter of the Newton matrix of size 2 len(free) + 2 len(solved)."""
+    n, m = len(free), len(solved)
+    slots, at = Slots(), _Index(layout, free, solved)
     minus = np.array([slots.add(k, k) for k in range(n)], np.int32)
     plus = np.array([slots.add(k, n + k) for k in range(n)], np.int32)
     dyn = [
@@ -156,10 +158,10 @@ def newton_pattern(layout: Layout, active: np.ndarray) -> tuple[NewtonPattern, S
     ), slots
 
 
-def rate_pattern(layout: Layout, active: np.ndarray) -> tuple[RatePattern, Slots]:
-    """Scatter of the acceleration problem of size n_q + len(active)."""
-    n = layout.n_q
-    slots, at = Slots(), _Index(layout, active)
+def rate_pattern(layout: Layout, free: np.ndarray, solved: np.ndarray) -> tuple[RatePattern, Slots]:
+    """Scatter of the acceleration problem of size len(free) + len(solved)."""
+    n = len(free)
+    slots, at = Slots(), _Index(layout, free, solved)
     second = np.array([c.differential_rate for c in layout.coordinates] + [True] * 7)
     dyn = []
     for c in layout.dynamics:

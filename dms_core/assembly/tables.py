@@ -30,6 +30,8 @@ class Calls(NamedTuple):
     par_ptr: np.ndarray
     row: np.ndarray
     """First row of each call; row[e + 1] ends it, (n_calls + 1,)."""
+    moving: np.ndarray
+    """Calls that see a coordinate which is solved for; a step evaluates these only."""
 
 
 class Signals(NamedTuple):
@@ -112,16 +114,22 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
         *_flat([c.placement.integers for c in calls], np.int32),
         *_flat([c.placement.numbers for c in calls], np.float64),
         np.array([c.row for c in calls] + [sum(c.rows for c in calls)], np.int64),
+        np.arange(len(calls)),
     )
 
 
 def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:
-    """Tables of dynamics, constraints and sensors."""
+    """Tables of dynamics, constraints and sensors; every call counts as moving."""
     return (
         call_tables(layout.dynamics, DYNAMIC),
         call_tables(layout.constraints, CONSTRAINT),
         call_tables(layout.sensors, SENSOR),
     )
+
+
+def moving_calls(calls: list[Call], free: np.ndarray) -> np.ndarray:
+    """Numbers of the calls that see a coordinate which is solved for."""
+    return np.array([e for e, c in enumerate(calls) if np.isin(c.iq, free).any()], np.int64)
 
 
 def _writer(function: Any) -> Any:

@@ -12,7 +12,7 @@ have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 
 
 import math
 
-from dms_core.assembly.arena import flags, floats, inner, ints
+from dms_core.assembly.arena import flags, floats, indices, inner, ints
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.newton import CONVERGED, DIVERGED, STALE_MATRIX, newton
@@ -39,12 +39,15 @@ def set_weights(m, s, o):
 
 @compiled
 def put_guess(m, s, c0, lam_slope):
-    """The guess into the iterate; first-order coordinates get the v that belongs to their q."""
-    w, second, cq = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq)
+    """The guess into the iterate; first-order coordinates get the v that belongs to their q.
+
+    Coordinates that are not solved for stay: a guess that nothing corrects would run away from rounding errors.
+    """
+    w, second, cq, free = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq), indices(m, MODEL.free)
     q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
     q_guess, v_guess = floats(s, STATE.q_guess), floats(s, STATE.v_guess)
     lam_n, lam_before, mu_n = floats(s, STATE.lam), floats(s, STATE.lam_before), floats(s, STATE.mu)
-    for i in range(cq.shape[0]):
+    for i in free:
         q[i] = q_guess[i]
         v[i] = v_guess[i] if second[i] else c0 * q_guess[i] + cq[i]
     for k in range(lam_n.shape[0]):
@@ -53,19 +56,22 @@ def put_guess(m, s, c0, lam_slope):
 
 
 @compiled
-def solve_stage(m, s, o, t, c0, lam_slope):
-    """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once."""
+def solve_stage(m, s, o, t, c0, lam_slope, last):
+    """One implicit stage at time t from the guess; gives (code, iterations). An old matrix is renewed once.
+
+    Only the last stage of a step has to close the constraints.
+    """
     count = ints(s, STATE.counts)
     set_inputs(m, s, t, True)
     count[AGE] += 1
     if count[AGE] > MAX_AGE:
         count[STALE] = 1
     put_guess(m, s, c0, lam_slope)
-    code, iterations = newton(m, s, o, c0)
+    code, iterations = newton(m, s, o, c0, last)
     if code == STALE_MATRIX:
         count[STALE] = 1
         put_guess(m, s, c0, lam_slope)
-        code, more = newton(m, s, o, c0)
+        code, more = newton(m, s, o, c0, last)
         iterations += more
         if code == STALE_MATRIX:
             code = DIVERGED
@@ -95,7 +101,7 @@ def bdf2_step(m, s, o, h):
     h1, h2 = clock[H_BEFORE], clock[H_BEFORE2]
     ratio = h / h1
     _prepare_bdf2(s, h, h1)
-    code, iterations = solve_stage(m, s, o, clock[T] + h, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h, ratio)
+    code, iterations = solve_stage(m, s, o, clock[T] + h, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h, ratio, True)
     if code != CONVERGED:
         return code, iterations, 0.0
     C = h**3 * (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio))
@@ -142,11 +148,11 @@ def start_step(m, s, o, h):
     """One SDIRK2 step of size h into w. Gives (code, iterations, weighted local error)."""
     t, c0 = floats(s, STATE.clock)[T], 1.0 / (GAMMA * h)
     _prepare_first_stage(s, h, c0)
-    code, first = solve_stage(m, s, o, t + GAMMA * h, c0, 0.0)
+    code, first = solve_stage(m, s, o, t + GAMMA * h, c0, 0.0, False)
     if code != CONVERGED:
         return code, first, 0.0
     _prepare_second_stage(s, h, c0)
-    code, second = solve_stage(m, s, o, t + h, c0, 0.0)
+    code, second = solve_stage(m, s, o, t + h, c0, 0.0, True)
     if code != CONVERGED:
         return code, first + second, 0.0
     w, is_second, error = inner(s, STATE.w), flags(m, MODEL.second), 0.0

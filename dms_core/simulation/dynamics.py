@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -69,6 +70,8 @@ class SolverOptions:
     """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s] (above 1000 / s, 1e-3 c0 times as much)."""
     max_steps: int = 10_000_000
     """Steps after which a run gives up."""
+    method: Literal["bdf2", "sdirk2"] = "bdf2"
+    """'sdirk2' needs no past: quicker where inputs jump every few steps, slower in smooth motion."""
 
     def __post_init__(self) -> None:
         for name in ("rtol", "h_max", "h_min", "newton_tol", "constraint_tol", "max_steps"):
@@ -79,12 +82,14 @@ class SolverOptions:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise InputError(f"solver option {name} = {value!r}; a positive number or None is wanted.")
+        if self.method not in ("bdf2", "sdirk2"):
+            raise InputError(f"solver option method = {self.method!r}; 'bdf2' or 'sdirk2' is wanted.")
 
     def numbers(self) -> Options:
         """For compiled code."""
         return Options(
             self.rtol, self.atol or 0.0, self.fixed_step or 0.0, self.h_max, self.h_min, self.newton_tol,
-            self.constraint_tol, self.max_steps,
+            self.constraint_tol, self.max_steps, int(self.method == "sdirk2"),
         )  # fmt: skip
 
 

@@ -3,7 +3,9 @@
     r2(q, v, vdot, lam) = 0,    phi_q vdot + (phi_q v)_q v + phi_tt = 0
 
 solved for vdot of second-order coordinates, v of first-order ones, and lam. Rigid bodies enter linearly; the fibres'
-force-velocity curve makes it a Newton iteration, halved whenever the residual grows.
+force-velocity curve makes it a Newton iteration, halved whenever the residual grows. Two cheaper ways serve SDIRK2:
+`stage_rates` behind a step, whose first-order rates are right already, and `jump_rates` behind a jump of the inputs,
+which changes first-order rates and accelerations linearly and leaves the matrix of the step before valid.
 """
 
 import math
@@ -11,8 +13,8 @@ import math
 from dms_core.assembly.arena import flags, floats, indices, inner, ints
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.parts import RATE_MATRIX, RATE_SOLUTION, run_part
-from dms_core.simulation.state import FACTORISATIONS, MODEL, PIVOT, STALE, STATE
+from dms_core.simulation.parts import RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
+from dms_core.simulation.state import FACTORISATIONS, MODEL, PIVOT, RATES_FACTORED, STALE, STATE
 
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-11
@@ -22,12 +24,13 @@ TOLERANCE = 1e-11
 @compiled
 def _change(m, s, share):
     """Add a share of the correction to the unknowns; gives the largest relative correction."""
-    w, second, active = inner(s, STATE.w), flags(m, MODEL.second), indices(m, MODEL.active)
+    w, second = inner(s, STATE.w), flags(m, MODEL.second)
+    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
     scale, x = floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
     v, a, lam = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
-    n, largest = second.shape[0], 0.0
-    for i in range(n):
-        change = share * x[i]
+    n, largest = free.shape[0], 0.0
+    for k in range(n):
+        i, change = free[k], share * x[k]
         if second[i]:
             a[i] += change
             size = abs(change) / (1.0 + abs(a[i]))
@@ -45,12 +48,13 @@ def _change(m, s, share):
 @compiled
 def _correct(m, s):
     """Newton correction at the present unknowns; False if the matrix is singular."""
-    w, active, b = inner(s, STATE.w), indices(m, MODEL.active), floats(s, STATE.rate_b)
+    w, b = inner(s, STATE.w), floats(s, STATE.rate_b)
+    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
     run_part(m, s, RATE_MATRIX)
     r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
-    n = b.shape[0] - active.shape[0]
+    n = free.shape[0]
     for i in range(n):
-        b[i] = -r2[i]
+        b[i] = -r2[free[i]]
     for k in range(active.shape[0]):
         b[n + k] = -phi_a[active[k]]
     ints(s, STATE.counts)[FACTORISATIONS] += 1
@@ -64,14 +68,15 @@ def _correct(m, s):
 def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
     second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
+    free = indices(m, MODEL.free)
     share, before = 1.0, math.inf
     for _ in range(MAX_ITERATIONS):
         if not _correct(m, s):
             return False
         largest = 0.0
-        for i in range(second.shape[0]):
-            if not second[i]:
-                largest = max(largest, abs(x[i]) / scale[i])
+        for k in range(free.shape[0]):
+            if not second[free[k]]:
+                largest = max(largest, abs(x[k]) / scale[free[k]])
         # Only first-order rates are nonlinear; where their corrections grow, shorten them.
         share = 0.5 * share if largest > 2.0 * before else min(1.0, 2.0 * share)
         before = largest
@@ -84,12 +89,10 @@ def _iterate(m, s):
 
 
 @compiled
-def consistent_rates(m, s):
-    """Fill v (first-order), qd, vd, lam of the state at its q, v and the inputs in w.u; False on failure."""
+def _put_state(m, s):
+    """q, v, vdot, lam of the state into the iterate."""
     w, second = inner(s, STATE.w), flags(m, MODEL.second)
-    q, v, qd, vd, lam = (
-        floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd), floats(s, STATE.lam),
-    )  # fmt: skip
+    q, v, vd, lam = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.vd), floats(s, STATE.lam)
     q_w, v_w, a_w, lam_w, mu_w = (
         floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam), floats(w, WORK.mu),
     )  # fmt: skip
@@ -98,14 +101,63 @@ def consistent_rates(m, s):
         a_w[i] = vd[i] if second[i] else 0.0
     for k in range(lam.shape[0]):
         lam_w[k], mu_w[k] = lam[k], 0.0
-    if not _iterate(m, s):
-        return False
-    lam_before, mu = floats(s, STATE.lam_before), floats(s, STATE.mu)
-    for i in range(q.shape[0]):
+
+
+@compiled
+def _take_rates(m, s):
+    """Rates and multipliers of the iterate into the state; the matrix belongs to its q and v."""
+    w, second = inner(s, STATE.w), flags(m, MODEL.second)
+    v, qd, vd = floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
+    v_w, a_w, lam_w = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
+    lam, lam_before, mu = floats(s, STATE.lam), floats(s, STATE.lam_before), floats(s, STATE.mu)
+    for i in range(v.shape[0]):
         v[i] = qd[i] = v_w[i]
         vd[i] = a_w[i] if second[i] else 0.0
     for k in range(lam.shape[0]):
         lam[k] = lam_before[k] = lam_w[k]
         mu[k] = 0.0
+    ints(s, STATE.counts)[RATES_FACTORED] = 1
+
+
+@compiled
+def consistent_rates(m, s):
+    """Fill v (first-order), qd, vd, lam of the state at its q, v and the inputs in w.u; False on failure."""
+    _put_state(m, s)
+    if not _iterate(m, s):
+        return False
+    _take_rates(m, s)
     ints(s, STATE.counts)[STALE] = 1
+    return True
+
+
+@compiled
+def stage_rates(m, s):
+    """As consistent_rates behind a step, whose first-order rates solve their equations: one correction is enough."""
+    _put_state(m, s)
+    if not _correct(m, s) or not _change(m, s, 1.0) < math.inf:
+        return False
+    _take_rates(m, s)
+    return True
+
+
+@compiled
+def jump_rates(m, s):
+    """As consistent_rates behind a jump of the inputs, with the factors at hand; False if there are none.
+
+    q and v are those of the factors, and only rows of equations that read an input are open. Where one reads it not
+    linearly, what is left over concerns the guess and the error estimate of the step alone.
+    """
+    if ints(s, STATE.counts)[RATES_FACTORED] != 1:
+        return False
+    _put_state(m, s)
+    run_part(m, s, RESIDUAL)
+    b, r2 = floats(s, STATE.rate_b), floats(inner(s, STATE.w), WORK.r2)
+    free = indices(m, MODEL.free)
+    b[:] = 0.0
+    for i in range(free.shape[0]):
+        b[i] = -r2[free[i]]
+    run_part(m, s, RATE_SOLUTION)
+    if not _change(m, s, 1.0) < math.inf:
+        return False
+    _take_rates(m, s)
     return True

@@ -50,13 +50,15 @@ def set_rates(s, c0):
 @compiled
 def right_hand_side(m, s, c0):
     """b = -(r1 / c0, r2 / c0^2, r3, r4 / c0), from the evaluated residual."""
-    w, active, b, cq = inner(s, STATE.w), indices(m, MODEL.active), floats(s, STATE.b), floats(s, STATE.cq)
+    w, b, cq = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.cq)
+    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
     q, v, gmu, r2 = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.gmu), floats(w, WORK.r2)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
-    n, k, h = cq.shape[0], active.shape[0], 1.0 / c0
-    for i in range(n):
-        b[i] = -h * (v[i] - c0 * q[i] - cq[i] - gmu[i])
-        b[n + i] = -h * h * r2[i]
+    n, k, h = free.shape[0], active.shape[0], 1.0 / c0
+    for j in range(n):
+        i = free[j]
+        b[j] = -h * (v[i] - c0 * q[i] - cq[i] - gmu[i])
+        b[n + j] = -h * h * r2[i]
     for i in range(k):
         b[2 * n + i] = -phi[active[i]]
         b[2 * n + k + i] = -h * phi_v[active[i]]
@@ -65,12 +67,12 @@ def right_hand_side(m, s, c0):
 @compiled
 def apply(m, s, c0, x, factor):
     """Add factor times the scaled correction x to q, v, lam, mu."""
-    w, active = inner(s, STATE.w), indices(m, MODEL.active)
+    w, free, active = inner(s, STATE.w), indices(m, MODEL.free), indices(m, MODEL.active)
     q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
-    n, k = floats(s, STATE.q).shape[0], active.shape[0]
+    n, k = free.shape[0], active.shape[0]
     for i in range(n):
-        q[i] += factor * x[i]
-        v[i] += factor * c0 * x[n + i]
+        q[free[i]] += factor * x[i]
+        v[free[i]] += factor * c0 * x[n + i]
     for i in range(k):
         lam[active[i]] += factor * c0 * c0 * x[2 * n + i]
         mu[active[i]] += factor * c0 * x[2 * n + k + i]
@@ -78,12 +80,12 @@ def apply(m, s, c0, x, factor):
 
 
 @compiled
-def correction_norm(s, c0):
+def correction_norm(m, s, c0):
     """Largest weighted component of the correction x in q and v, inf if any is not finite."""
-    x, wq, wv = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv)
-    n, largest = wq.shape[0], 0.0
+    x, wq, wv, free = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv), indices(m, MODEL.free)
+    n, largest = free.shape[0], 0.0
     for i in range(n):
-        size = max(abs(x[i]) / wq[i], abs(c0 * x[n + i]) / wv[i])
+        size = max(abs(x[i]) / wq[free[i]], abs(c0 * x[n + i]) / wv[free[i]])
         if not size < math.inf:
             return math.inf
         largest = max(largest, size)
@@ -118,7 +120,7 @@ def correction(m, s, c0):
     right_hand_side(m, s, c0)
     run_part(m, s, NEWTON_SOLUTION)
     ints(s, STATE.counts)[ITERATIONS] += 1
-    return correction_norm(s, c0)
+    return correction_norm(m, s, c0)
 
 
 @compiled
@@ -168,7 +170,7 @@ def close_constraints(m, s, o, c0):
     """
     w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), indices(m, MODEL.active)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
-    n, k = floats(s, STATE.q).shape[0], active.shape[0]
+    n, k = indices(m, MODEL.free).shape[0], active.shape[0]
     for _ in range(MAX_CLOSINGS):
         run_part(m, s, CONSTRAINTS)
         error, error_v = largest_errors(s)
@@ -184,8 +186,8 @@ def close_constraints(m, s, o, c0):
 
 
 @compiled
-def newton(m, s, o, c0):
-    """Solve the stage from the guess in w. Gives (code, iterations).
+def newton(m, s, o, c0, close):
+    """Solve the stage from the guess in w; `close` brings the constraints to their tolerance. Gives (code, iterations).
 
     STALE_MATRIX asks the caller to put the guess back and to call again with count[STALE] = 1.
     """
@@ -218,7 +220,7 @@ def newton(m, s, o, c0):
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
         left = norm * contraction / (1.0 - contraction) if k > 0 else 3.0 * norm * max(contraction, 0.05)
-        if left < o.newton_tol and close_constraints(m, s, o, c0):
+        if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
             clock[CONTRACTION] = contraction
             if contraction > SLOW:
                 count[STALE] = 1

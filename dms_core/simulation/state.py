@@ -12,10 +12,10 @@ from dms_core.assembly.tables import Calls, Signals, Work
 from dms_core.linear.lu import LuTables, storage
 
 # Entries of State.clock [s, unless said].
-T, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION, PIVOT, T_INPUTS = range(8)
+T, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION, PIVOT, T_INPUTS, WORST = range(9)
 # Entries of State.counts.
 (STEPS, REJECTED_ERROR, REJECTED_NEWTON, ITERATIONS, FACTORISATIONS, RESTARTS,
- RESTART, STALE, AGE, BEFORE_JUMP) = range(10)  # fmt: skip
+ RESTART, STALE, AGE, BEFORE_JUMP, RATES_FACTORED) = range(11)  # fmt: skip
 # Entries of State.largest.
 PHI, PHI_V, MU, H_LEAST, H_MOST = range(5)
 
@@ -30,6 +30,8 @@ class Tables(NamedTuple):
     newton_lu: LuTables
     rates: RatePattern
     rate_lu: LuTables
+    free: np.ndarray
+    """Coordinates that are solved for: all but those of welded bodies, (n_free,)."""
     active: np.ndarray
     """Constraint rows that are solved for, (n_active,)."""
     second: np.ndarray
@@ -90,6 +92,8 @@ class Options(NamedTuple):
     newton_tol: float
     constraint_tol: float
     max_steps: int
+    one_step: int
+    """1 for SDIRK2 throughout, 0 for BDF2 behind an SDIRK2 start."""
 
 
 MODEL, STATE = fields(Tables), fields(State)
@@ -97,7 +101,7 @@ MODEL, STATE = fields(Tables), fields(State)
 
 def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
     """Storage of both linear systems."""
-    n, k = len(tables.second), len(tables.active)
+    n, k = len(tables.free), len(tables.active)
     newton, rates = tables.newton_lu, tables.rate_lu
     return {
         "newton_values": storage(newton.size),
@@ -114,10 +118,10 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
     n, m = len(tables.second), len(w.lam)
     zeros = np.zeros
     w.q[:n], w.v[:n] = q, v
-    counts = zeros(10, np.int64)
+    counts = zeros(11, np.int64)
     counts[RESTART] = counts[STALE] = 1
     return Packed(State(
-        w, signals, zeros(8), counts, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
+        w, signals, zeros(9), counts, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
         q.copy(), v.copy(), v.copy(), zeros(n), zeros(m), zeros(m), q.copy(), v.copy(), zeros(m),
         *(zeros(n) for _ in range(6)), **_linear_arrays(tables),
     ))  # fmt: skip

@@ -11,7 +11,7 @@ from dms_core.assembly.arena import floats, inner, ints
 from dms_core.assembly.residual import SIGNALS, WORK
 from dms_core.jit import compiled
 from dms_core.simulation.bdf2 import GAMMA, bdf2_step, set_weights, start_step
-from dms_core.simulation.initial_rates import consistent_rates
+from dms_core.simulation.initial_rates import consistent_rates, jump_rates, stage_rates
 from dms_core.simulation.newton import CONVERGED, MAX_ITERATIONS, SINGULAR, note_errors
 from dms_core.simulation.parts import set_inputs
 from dms_core.simulation.state import (
@@ -20,6 +20,7 @@ from dms_core.simulation.state import (
     H_LEAST,
     H_MOST,
     H_WANTED,
+    RATES_FACTORED,
     REJECTED_ERROR,
     REJECTED_NEWTON,
     RESTART,
@@ -27,6 +28,7 @@ from dms_core.simulation.state import (
     STALE,
     STATE,
     STEPS,
+    WORST,
     T,
 )
 
@@ -100,6 +102,7 @@ def accept(s, h, c0, started):
     largest[H_MOST] = max(largest[H_MOST], h)
     ints(s, STATE.counts)[STEPS] += 1
     ints(s, STATE.counts)[RESTART] = 0
+    ints(s, STATE.counts)[RATES_FACTORED] = 0
 
 
 @compiled
@@ -108,7 +111,8 @@ def restart(m, s, o):
     clock = floats(s, STATE.clock)
     set_inputs(m, s, clock[T], False)
     ints(s, STATE.counts)[RESTARTS] += 1
-    if not consistent_rates(m, s):
+    clock[WORST] = 0.0
+    if not (o.one_step == 1 and jump_rates(m, s)) and not consistent_rates(m, s):
         return False
     set_weights(m, s, o)
     if clock[H_WANTED] <= 0.0:
@@ -117,10 +121,12 @@ def restart(m, s, o):
 
 
 @compiled
-def landing_size(h, rest, fixed):
-    """h shortened so that a step ends after `rest`, without leaving a sliver for the one after."""
+def landing_size(h, rest, fixed, equal):
+    """h shortened so that a step ends after `rest`, without leaving a sliver; `equal`: in steps of one size."""
     if h >= rest * (1.0 - 1e-9):
         return rest
+    if equal:
+        return rest / math.ceil(rest / h * (1.0 - 1e-9))
     return 0.5 * rest if h > 0.55 * rest and not fixed else h
 
 
@@ -148,7 +154,7 @@ def resize(h, error, iterations):
 def one_step(m, s, o, stop):
     """Attempts until one step is accepted; gives DONE or what went wrong."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
-    started = count[RESTART] == 1
+    started, equal = count[RESTART] == 1 or o.one_step == 1, o.one_step == 1 and not fixed
     set_weights(m, s, o)
     wanted = o.fixed_step if fixed else min(clock[H_WANTED], o.h_max)
     if not fixed and wanted < o.h_min:
@@ -158,7 +164,7 @@ def one_step(m, s, o, stop):
     rest = stop - clock[T]
     first_try = True
     while True:
-        h = landing_size(wanted, rest, fixed)
+        h = landing_size(wanted, rest, fixed, equal)
         code, iterations, error, c0 = try_step(m, s, o, h, started)
         if code == SINGULAR:
             return MATRIX_SINGULAR
@@ -176,12 +182,20 @@ def one_step(m, s, o, stop):
             return STEP_TOO_SMALL if code == CONVERGED else NEWTON_FAILED
     note_errors(s)
     accept(s, h, c0, started)
-    if started:
-        # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2.
+    # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2.
+    if o.one_step == 1:
+        if not stage_rates(m, s):
+            return RATES_FAILED
+    elif started:
         consistent_rates(m, s)
     if h == rest:
         land(s, stop)
-    if not fixed:
+    if equal:
+        clock[WORST] = max(clock[WORST], error)
+        if h == rest or not first_try:
+            clock[H_WANTED] = max(resize(h, clock[WORST], iterations), wanted if h < wanted and first_try else 0.0)
+            clock[WORST] = 0.0
+    elif not fixed:
         size = resize(h, error, iterations)
         # A step cut short by a landing says little about the size that the motion allows.
         clock[H_WANTED] = max(size, wanted) if h < wanted and first_try else size

@@ -46,7 +46,9 @@ def test_shares_of_work_sum_to_one_and_measures_are_complete():
         assert list(p["summary"]) == [m.name for m in MEASURES]
         for e in p["episodes"]:
             m = e["measures"]
-            assert math.isclose(m["device_work_share"] + m["patient_work_share"], 1.0, rel_tol=1e-12)
+            shares = m["device_work_share"], m["patient_work_share"]
+            # Nobody may have done positive work in so short a time: an arm that only sinks.
+            assert math.isclose(sum(shares), 1.0, rel_tol=1e-12) or np.isnan(shares).all()
             assert np.isfinite([m["return"], m["tracking_rms_deg"], m["peak_tension_N"], m["peak_reaction_N"]]).all()
 
 

@@ -51,14 +51,15 @@ class Stage:
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Scaled residual (r1 / c0, r2 / c0^2, r3, r4 / c0) at the present state plus the scaled correction x."""
         apply(self.m, self.s, self.c0, x, 1.0)
-        evaluate_residual(inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w))
+        evaluate_residual(inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w), False)
         right_hand_side(self.m, self.s, self.c0)
         apply(self.m, self.s, self.c0, x, -1.0)
         return -self.simulation.state.b
 
     def matrix(self) -> np.ndarray:
         """Dense scaled Newton matrix from its scatter maps."""
-        pattern, slots = newton_pattern(self.model.layout, self.model.active_rows)
+        welds = self.model.welds
+        pattern, slots = newton_pattern(self.model.layout, welds.free, welds.solved)
         packed, values = Packed(pattern), np.zeros(len(slots.number))
         dynamics, constraints = inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints)
         evaluate_newton(dynamics, constraints, packed.table, inner(self.s, STATE.w), self.c0, values)
@@ -82,8 +83,8 @@ class Stage:
 def _unknown_scales(model: Model, c0: float) -> np.ndarray:
     """Sizes of the scaled unknowns (dq, dv / c0, dlam / c0^2, dmu / c0) over which the residual is smooth."""
     by_q, by_v = scales(model)
-    k = len(model.active_rows)
-    return np.concatenate([by_q, by_v / c0, np.full(k, 10.0 / c0**2), np.full(k, 1.0 / c0)])
+    free, k = model.welds.free, len(model.welds.solved)
+    return np.concatenate([by_q[free], by_v[free] / c0, np.full(k, 10.0 / c0**2), np.full(k, 1.0 / c0)])
 
 
 def test_the_specimen_has_every_kind():
@@ -105,7 +106,8 @@ def test_newton_matrix_is_the_derivative_of_the_residual(model, c0, seed):
     # As in test_derivatives: rounding 1e-16 / 3e-5 of the residual, and the tendon's curvature 1e-6 of a derivative.
     allowed = 1e-6 * np.abs(numeric).max(axis=0) + (1e-11 * value + 3e-11 * np.abs(A) @ by[:, None]) / by + 1e-12
     wrong = np.argwhere(np.abs(A - numeric) > allowed)
-    names = [*model.layout.names] * 2 + [model.layout.row_names[k] for k in model.active_rows] * 2
+    names = [model.layout.names[k] for k in model.welds.free] * 2
+    names += [model.layout.row_names[k] for k in model.welds.solved] * 2
     assert not len(wrong), [(names[i], names[j], A[i, j], numeric[i, j]) for i, j in wrong[:8]]
 
 
@@ -113,31 +115,33 @@ def test_newton_matrix_is_the_derivative_of_the_residual(model, c0, seed):
 def test_the_models_own_lu_solves_with_that_matrix(model, c0):
     """The scatter into the LU and the elimination order, chosen at another state and another c0."""
     stage = Stage(model, c0, 1)
-    A, x = stage.matrix(), np.random.default_rng(2).normal(size=2 * model.n_q + 2 * len(model.active_rows))
+    A, x = stage.matrix(), np.random.default_rng(2).normal(size=2 * len(model.welds.free) + 2 * len(model.welds.solved))
     # A backward stable solve leaves 1e-15 of |A| |x|; pivots down to 1e-6 of their row cost the rest.
     np.testing.assert_allclose(A @ stage.solved(A @ x), A @ x, atol=1e-8)
 
 
 def test_acceleration_matrix_is_the_derivative_of_its_equations(model):
     stage = Stage(model, 10.0, 0)
-    w, n, second = stage.simulation.state.w, model.n_q, model.second_order
-    pattern, slots = rate_pattern(model.layout, model.active_rows)
+    w, free, solved = stage.simulation.state.w, model.welds.free, model.welds.solved
+    second = model.second_order[free]
+    pattern, slots = rate_pattern(model.layout, free, solved)
     packed, values = Packed(pattern), np.zeros(len(slots.number))
-    start = np.concatenate([np.where(second, w.a[:n], w.v[:n]), w.lam[model.active_rows]])
-    v = w.v[:n].copy()
+    start = np.concatenate([np.where(second, w.a[free], w.v[free]), w.lam[solved]])
+    v = w.v[free].copy()
 
     def equations(x: np.ndarray) -> np.ndarray:
-        w.a[:n], w.v[:n] = np.where(second, x[:n], 0.0), np.where(second, v, x[:n])
-        w.lam[model.active_rows] = x[n:]
+        n = len(free)
+        w.a[free], w.v[free] = np.where(second, x[:n], 0.0), np.where(second, v, x[:n])
+        w.lam[solved] = x[n:]
         dynamics, constraints = inner(stage.m, MODEL.dynamics), inner(stage.m, MODEL.constraints)
         evaluate_rates(dynamics, constraints, packed.table, inner(stage.s, STATE.w), values)
-        return np.concatenate([w.r2[:n], w.phi_a[model.active_rows]])
+        return np.concatenate([w.r2[free], w.phi_a[solved]])
 
     value = np.abs(equations(start)).max()
     rows, columns = slots.coordinates()
     A = np.zeros((len(start),) * 2)
     A[rows, columns] = values
-    by = np.concatenate([scales(model)[1], np.full(len(model.active_rows), 10.0)])
+    by = np.concatenate([scales(model)[1][free], np.full(len(solved), 10.0)])
     numeric = differences(equations, start, by)
     # Linear but for the force-velocity curve: rounding 1e-16 / 3e-5 of values near 1e3.
     assert np.all(np.abs(A - numeric) <= 1e-6 * np.abs(numeric) + 1e-11 * value / by)
@@ -152,7 +156,10 @@ def test_start_satisfies_every_equation(model):
     m, s, w = model.tables.table, simulation._world.table, simulation.state.w
     evaluate_inputs(inner(s, STATE.signals), 0.0, False, inner(s, STATE.w))
     assert consistent_rates(m, s)
-    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w))
+    state = simulation.state
+    x = (state.q[None], state.v[None], state.vd[None], state.lam[None])
+    w.lam[:] = model.whole_multipliers(state.signals, np.zeros(1), *x, np.ones(1, bool))[0]
+    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w), True)
     # Forces are near 1e3 N.
     assert np.abs(w.r2[: model.n_q]).max() < 1e-9
     trajectory = simulate(model, 0.01, SolverOptions(rtol=1e-8))

@@ -136,19 +136,21 @@ def test_reward_is_the_sum_of_its_terms(env):
     _, reward, _, _, info = env.step(np.array([-0.5, -0.9]))
     weights, found = info["reward_weights"], info["reward_terms"]
     assert reward == pytest.approx(sum(weights[k] * found[k] for k in weights))
-    assert found["tracking"] == pytest.approx(math.exp(-((info["tracking_error_deg"] / 10.0) ** 2)))
+    assert found["tracking"] == pytest.approx(math.exp(-((info["tracking_error_deg"] / 5.0) ** 2)))
     assert found["smoothness"] == pytest.approx(-(0.5**2 + 0.9**2) / 8.0)
 
 
 def test_terms():
-    quiet = {"error": 0.0, "moment": 0.0, "reaction": 400.0, "action": HOLD, "before": HOLD, "unsafe": False}
+    quiet = {"error": 0.0, "moment": 0.0, "lacking": 1.0, "scale": 4.0, "reaction": 400.0, "action": HOLD,
+             "before": HOLD, "unsafe": False}  # fmt: skip
     assert total(terms(**quiet), Weights()) == 1.0
-    assert terms(**(quiet | {"moment": -5.0}))["assistance"] == -0.5
-    assert terms(**(quiet | {"moment": 1e3}))["assistance"] == -2.0
+    # What is lacking may be given for nothing; what is beyond it, and what pulls down, may not.
+    helped = [terms(**(quiet | {"moment": m}))["assistance"] for m in (1.0, 3.0, -3.0, 1e3, -1e3)]
+    assert helped == [0.0, -0.5, -0.75, -2.0, -2.0]
     assert terms(**(quiet | {"reaction": 750.0}))["reaction"] == -0.5
     assert terms(**(quiet | {"before": -HOLD}))["smoothness"] == -1.0
     assert terms(**(quiet | {"unsafe": True}))["unsafe"] == -1.0
-    assert terms(**(quiet | {"error": math.radians(10.0)}))["tracking"] == pytest.approx(math.exp(-1.0))
+    assert terms(**(quiet | {"error": math.radians(5.0)}))["tracking"] == pytest.approx(math.exp(-1.0))
 
 
 def test_share():
@@ -202,16 +204,17 @@ def test_a_failed_solver_ends_the_episode_with_its_sentence(env):
     assert math.isfinite(reward)
 
 
-def test_effort_falls_where_the_device_does_the_work():
-    slack = {"slacking_rate": 3.0, "least_effort": 0.2}
+def test_effort_is_forgotten_where_the_device_leaves_no_error():
+    slack = {"slacking_rate": 0.5, "effort_recovery": 10.0, "maximum_activation_flexors": 0.1}
     env = ElbowLiftEnv(action_mode="pid_setpoint", patient=slack, load=1.0)
     efforts = {}
-    for authority in (-1.0, 1.0):
+    for authority in (-0.9, 1.0):
         env.reset(seed=0)
         for _ in range(150):
             *_, info = env.step(np.array([0.0, authority]))
         efforts[authority] = info["effort"]
-    assert efforts[1.0] < 0.8 * efforts[-1.0]
+    # Without any error, exp(-0.5 x 3) = 0.22 of it would be left.
+    assert efforts[1.0] < 0.6 < 0.7 < efforts[-0.9], efforts
 
 
 def test_readings_hold_what_the_figures_show(env):
