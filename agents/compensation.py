@@ -6,11 +6,12 @@ controller's command, so
     kp o + ki int(o) dt = M(psi) / r(psi)
 
 makes it give the agonist tension that holds a share of arm, lower link and weight at rest: M this share of their moment
-about the elbow, r the rope's moment arm. The share, the authority and a constant lag of the setpoint are tuned
-(tuning.py); as the authority scales the whole command, the ropes give authority times share. psi is that of 0.1 s ahead, since the setpoint's filter (20 rad/s, critically damped) comes 0.1 s
-late. The moment is that of an average man's proportions with the patient's mass and height, and the weight is read off
-the machine: numbers that a therapist has, from the "privileged" group. The patient's own effort is not
-subtracted: of who can lift, the PID has to take the surplus back, and tracking may get worse.
+about the elbow, r the rope's moment arm. psi is that of 0.1 s ahead, since the setpoint's filter (20 rad/s, critically
+damped) comes 0.1 s late. The share, the authority and a constant lag of the setpoint are tuned (tuning.py); as the
+authority scales the whole command, the ropes give authority times share. The moment is that of an average man's
+proportions with the patient's mass and height, and the weight is read off the machine: numbers that a therapist has,
+from the "privileged" group. The patient's own effort is not subtracted: of who can lift, the PID has to take the
+surplus back, and tracking may get worse.
 """
 
 from __future__ import annotations

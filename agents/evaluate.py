@@ -13,10 +13,13 @@ from agents.measures import MEASURES, Record, measured
 from agents.policy import Policy
 from agents.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, interquartile_mean, mean
 from dms_core.errors import InputError
+from exo_env.need import ABLE
 from exo_env.population import Source, population
 from exo_env.repetition import Repetition
 
 ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
+OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
+"""Measures that are printed of them."""
 
 
 def patient_seeds(seed: int, patients: int) -> list[int]:
@@ -44,7 +47,8 @@ def evaluate(
         settings: further ones of the environment.
 
     Returns:
-        JSON-able: what was run, and by policy `episodes` and `summary`, an Estimate of each measure.
+        JSON-able: what was run, and by policy `episodes`, `summary`, an Estimate of each measure, and `summary_able`,
+        the same over the patients who can do something (ability of at least `able`).
 
     Raises:
         InputError: the population is unknown, or a number is not usable.
@@ -65,10 +69,14 @@ def evaluate(
             if progress is not None:
                 progress(one.name)
         env.close()
-        found[one.name] = {"title": one.title, "summary": summary(episodes, seed), "episodes": episodes}
+        able = [e for e in episodes if e["ability"] >= ABLE]
+        found[one.name] = {
+            "title": one.title, "summary": summary(episodes, seed), "summary_able": summary(able, seed),
+            "episodes": episodes,
+        }  # fmt: skip
     return {
         "population": source.title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
-        "confidence": CONFIDENCE, "resamples": RESAMPLES, "policies": found,
+        "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE, "policies": found,
     }  # fmt: skip
 
 
@@ -88,7 +96,7 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int) -> dict[str, Any]:
         over = terminated or truncated
     record.event = info.get("event")
     return {
-        **{k: drawn[k] for k in ("load", "reference", "patient")},
+        **{k: drawn[k] for k in ("load", "ability", "reference", "patient")},
         "event": record.event,
         "measures": measured(record),
     }
@@ -105,16 +113,27 @@ def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, fl
 
 
 def table(results: dict[str, Any]) -> str:
-    """What is printed: a row a measure, a column a policy, interval in brackets."""
+    """What is printed: a row a measure, a column a policy, interval in brackets; then some of who can do something."""
     names = list(results["policies"])
-    rows = [["", *names]]
-    for m in MEASURES:
-        label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
-        rows.append([label, *(_cell(Estimate(**results["policies"][n]["summary"][m.name])) for n in names)])
+    able = results["policies"][names[0]]["episodes"]
+    count = sum(e["ability"] >= results["able"] for e in able)
+    rows = [["", *names], *_rows(results, "summary", [m.name for m in MEASURES])]
+    rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
+    rows += _rows(results, "summary_able", OF_THE_ABLE)
     widths = [max(len(row[k]) for row in rows) for k in range(len(names) + 1)]
     lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
              for row in rows]  # fmt: skip
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _rows(results: dict[str, Any], summary: str, measures: Sequence[str]) -> list[list[str]]:
+    """A row a measure."""
+    found = []
+    for m in MEASURES:
+        if m.name in measures:
+            label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
+            found.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in results["policies"].values())])
+    return found
 
 
 def _cell(e: Estimate) -> str:

@@ -1,4 +1,4 @@
-"""Numbers of the baselines that are nobody's: where they may lie, and those that `python -m agents tune-baselines` found.
+"""Numbers of the baselines: where they may lie, and those that `python -m agents tune-baselines` found.
 
 They stand in configs/agents/baselines.yml, a policy a key, and are the ones that a policy uses by default.
 """

@@ -82,7 +82,12 @@ def tune(
     """
     if policy not in tunable():
         raise InputError(f"policy '{policy}' has nothing to tune; there are {', '.join(tunable())}.")
-    for name, value, least in (("tries", tries, 2), ("patients", patients, 1), ("seed", seed, 0), ("workers", workers, 1)):
+    for name, value, least in (
+        ("tries", tries, 2),
+        ("patients", patients, 1),
+        ("seed", seed, 0),
+        ("workers", workers, 1),
+    ):
         if not isinstance(value, int) or value < least:
             raise InputError(f"{name} = {value!r}; a whole number from {least} is wanted.")
     ranges, seeds = tunable()[policy], patient_seeds(STREAM + seed, patients)

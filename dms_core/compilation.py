@@ -16,30 +16,31 @@ from numba.core import event
 from numba.core.caching import NullCache
 
 PACKAGE = Path(__file__).parent
-STAMP = PACKAGE / "__pycache__" / "compiled_sources.sha256"
+STAMP = "compiled_sources.sha256"
 
 
-def fingerprint() -> str:
-    """Hash of every source file that holds compiled functions."""
+def fingerprint(package: Path = PACKAGE) -> str:
+    """Hash of every source file that holds compiled functions, of this package and of one built on it."""
     digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        text = path.read_bytes()
-        if b"@compiled" in text:
-            digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + text)
+    for folder in dict.fromkeys((PACKAGE, package)):
+        for path in sorted(folder.rglob("*.py")):
+            text = path.read_bytes()
+            if b"@compiled" in text:
+                digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + text)
     return digest.hexdigest()
 
 
-def drop_stale_code() -> None:
-    """Remove numba's files of this package if they belong to other sources. Without write access nothing is done."""
-    now = fingerprint()
+def drop_stale_code(package: Path = PACKAGE) -> None:
+    """Remove numba's files of a package if they belong to other sources. Without write access nothing is done."""
+    now, stamp = fingerprint(package), package / "__pycache__" / STAMP
     with contextlib.suppress(OSError):
-        if STAMP.is_file() and STAMP.read_text() == now:
+        if stamp.is_file() and stamp.read_text() == now:
             return
         for pattern in ("*.nbi", "*.nbc"):
-            for path in PACKAGE.rglob(f"__pycache__/{pattern}"):
+            for path in package.rglob(f"__pycache__/{pattern}"):
                 path.unlink(missing_ok=True)
-        STAMP.parent.mkdir(exist_ok=True)
-        STAMP.write_text(now)
+        stamp.parent.mkdir(exist_ok=True)
+        stamp.write_text(now)
 
 
 class _Announcer(event.Listener):

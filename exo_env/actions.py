@@ -1,12 +1,13 @@
 """What an action in [-1, 1]^2 does: a drive is the part of the model behind the ropes, and how actions become inputs.
 
-rope_tension: both tensions are commanded. a = -1 is a slack rope, a = 1 the largest tension; the command's change per
-period is limited, and the motor follows it with a first-order lag inside the DAE.
+rope_tension: both tensions are commanded. a = -1 is a slack rope, a = 1 the largest tension; the command's rate is
+limited, and the motor follows it with a first-order lag inside the DAE.
 
 pid_setpoint: the device's own PID holds psi + offset; a_0 shifts its setpoint through a second-order filter inside the
-DAE (psi must be C1 for the controller), a_1 sets its share of authority, whose change is limited as well.
+DAE (psi must be C1 for the controller), a_1 sets its share of authority, whose rate is limited as well.
 
-In both the PID's states are coordinates of the DAE; with rope_tension no rope listens to them.
+In both a command goes linearly from its last value to the new one over the control period, as far as its largest rate
+takes it. The PID's states are coordinates of the DAE; with rope_tension no rope listens to them.
 """
 
 from __future__ import annotations
@@ -57,10 +58,9 @@ class RopeTension(Settings):
         """Values of the inputs at the start: the arm is held by the agonist."""
         return np.array([min(max(holding_tension, 0.0), self.max_tension[0]), 0.0])
 
-    def held(self, action: np.ndarray, before: np.ndarray, period: float) -> np.ndarray:
-        """Values of the inputs over the coming period [N], shape (2,)."""
-        wanted, change = 0.5 * (action + 1.0) * np.array(self.max_tension), self.rate_limit * period
-        return np.clip(wanted, before - change, before + change)
+    def table(self, period: float) -> np.ndarray:
+        """Offset and gain from an action to a command [N], and its largest change in a period [N], shape (2, 3)."""
+        return np.array([[0.5 * most, 0.5 * most, self.rate_limit * period] for most in self.max_tension])
 
     def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
         """The device with motors that follow the commands."""
@@ -99,11 +99,9 @@ class PidSetpoint(Settings):
         """Values of the inputs at the start: no change, and half of the authority, as for an action of zeros."""
         return np.array([0.0, 0.5])
 
-    def held(self, action: np.ndarray, before: np.ndarray, period: float) -> np.ndarray:
-        """Values of the inputs over the coming period: setpoint change [rad] and authority [-], shape (2,)."""
-        change = self.authority_rate * period
-        wanted = 0.5 * (action[1] + 1.0)
-        return np.array([self.setpoint_range * action[0], min(max(wanted, before[1] - change), before[1] + change)])
+    def table(self, period: float) -> np.ndarray:
+        """Offset and gain to setpoint change [rad] and authority [-], largest change in a period, shape (2, 3)."""
+        return np.array([[0.0, self.setpoint_range, np.inf], [0.5, 0.5, self.authority_rate * period]])
 
     def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
         """The filter and the device, whose controller reads it."""

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.jit import compiled
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.muscles.muscle import fibre_state, pennation_cosine
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
+from exo_env.jit import compiled
 
 
 class ArmTable(NamedTuple):

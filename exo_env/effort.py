@@ -1,4 +1,4 @@
-"""From what a patient wants to what the muscles are told, once a control period and held over it.
+"""From what a patient wants to what the muscles are told at the end of each control period.
 
 For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activations a_k of the motor command:
 
@@ -16,8 +16,9 @@ Weakness is of the descending command: reflex and tremor know no ceiling. The fl
 elbow, the extensors by flexion. Tremor alternates between the groups and its phase wanders with
 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of that width at half height.
 
-All signals are held over a period, so a delay that is no multiple of it takes the mean of the delayed signal over the
-period: linear interpolation between two samples. One patient is one row of numbers (`PATIENT` in patient.py) and one
+Signals are linear between control times, and so is the excitation that reaches the muscles. What is wanted is known
+beforehand and taken at the end of the period; what is felt (error, stretch) is known at its beginning, so that a delay
+shorter than a period counts as one. One patient is one row of numbers (`PATIENT` in patient.py) and one
 row of state (`STATE`); the functions neither allocate nor draw random numbers, so that a batch can run them.
 """
 
@@ -27,12 +28,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dms_core.errors import InputError
 from dms_core.model.muscles.activation import MINIMUM, limited
 from exo_env.fatigue import advance_fatigue
 from exo_env.human import FLEXORS, MUSCLES
+from exo_env.jit import compiled
 from exo_env.patient import LONGEST_DELAY, PATIENT, Patient
 from exo_env.slacking import advance_effort
 
@@ -70,19 +71,20 @@ class RingIndex(NamedTuple):
 STATE, RING = StateIndex(), RingIndex()
 
 
-def samples(period: float) -> int:
+@compiled
+def samples_in(period):
     """Samples in each ring at a control period [s]."""
     return int(LONGEST_DELAY / period + 1e-9) + 2
 
 
 def state_size(period: float) -> int:
     """Length of a patient's row of state."""
-    return STATE.memory + (RING.error + 1) * samples(period)
+    return STATE.memory + (RING.error + 1) * samples_in(period)
 
 
-@njit(cache=True)
+@compiled
 def delayed(state, n, ring, periods):
-    """A signal as it was some periods ago, in the mean over a period."""
+    """A signal as it was some periods ago, linear between two samples."""
     whole = int(periods)
     part = periods - whole
     newest = int(state[STATE.newest])
@@ -93,15 +95,21 @@ def delayed(state, n, ring, periods):
     return late + part * (state[start + (newest - whole - 1) % n] - late)
 
 
-@njit(cache=True)
+@compiled
+def felt(state, n, ring, delay, period):
+    """A signal whose newest sample is of the beginning of the period, some time [s] before its end."""
+    return delayed(state, n, ring, max(delay / period - 1.0, 0.0))
+
+
+@compiled
 def intended(par, state, n, period, k):
     """c_k [-]."""
     command = delayed(state, n, RING.command + k, par[PATIENT.neural_delay] / period)
-    error = delayed(state, n, RING.error, par[PATIENT.feedback_delay] / period)
+    error = felt(state, n, RING.error, par[PATIENT.feedback_delay], period)
     return max(command + SIGN[k] * par[PATIENT.feedback_gain] * error, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def wanted_share(par, state, n, period, k):
     """T_k [-]."""
     others = 0.0
@@ -117,14 +125,14 @@ def wanted_share(par, state, n, period, k):
     return wanted / maximum if wanted < maximum else 1.0
 
 
-@njit(cache=True)
+@compiled
 def voluntary_drive(par, state, k, share):
     """What weakness and fatigue leave of a wanted share [-]."""
     maximum = par[PATIENT.maximum_activation_flexors if SIGN[k] > 0.0 else PATIENT.maximum_activation_extensors]
     return maximum * min(share, 1.0 - state[STATE.fatigued + k])
 
 
-@njit(cache=True)
+@compiled
 def reset_effort(par, state, n, period, wanted, phase):
     """State of a patient who has wanted `wanted` for long, rested but for what was fatigued before."""
     state[:] = 0.0
@@ -142,7 +150,7 @@ def reset_effort(par, state, n, period, wanted, phase):
             state[STATE.memory + (RING.drive + k) * n + i] = drive
 
 
-@njit(cache=True)
+@compiled
 def remember(par, state, n, wanted, error, stretch):
     """Takes the samples of a new period into the rings."""
     newest = (int(state[STATE.newest]) + 1) % n
@@ -155,7 +163,7 @@ def remember(par, state, n, wanted, error, stretch):
         state[STATE.memory + (RING.reflex + k) * n + newest] = reflex
 
 
-@njit(cache=True)
+@compiled
 def step_effort(par, state, n, period, wanted, error, stretch, noise, out):
     """One control period of one patient.
 
@@ -164,20 +172,23 @@ def step_effort(par, state, n, period, wanted, error, stretch, noise, out):
         state: changed in place, shape (state_size(period),).
         n: samples in each ring.
         period: control period [s].
-        wanted: activations of the motor command [-], shape (6,).
-        error: psi - theta [rad].
-        stretch: rate at which each muscle is stretched, as rate of the elbow [rad/s], shape (6,).
+        wanted: activations of the motor command at the end of the period [-], shape (6,).
+        error: psi - theta at its beginning [rad].
+        stretch: rate at which each muscle is stretched, as rate of the elbow, at its beginning [rad/s], shape (6,).
         noise: a standard normal number for the tremor.
-        out: excitations over this period [-], shape (6,).
+        out: excitations at the end of the period [-], shape (6,).
     """
+    state[STATE.effort] = advance_effort(
+        state[STATE.effort], error, par[PATIENT.slacking_rate], par[PATIENT.effort_recovery],
+        par[PATIENT.least_effort], period,
+    )  # fmt: skip
     remember(par, state, n, wanted, error, stretch)
     turn = 2.0 * math.pi * par[PATIENT.tremor_frequency] * period
-    # The value held is that of the middle of the period.
-    tremor = par[PATIENT.tremor_amplitude] * math.sin(state[STATE.phase] + 0.5 * turn)
+    tremor = par[PATIENT.tremor_amplitude] * math.sin(state[STATE.phase] + turn)
     for k in range(N):
         wants = wanted_share(par, state, n, period, k)
         drive = voluntary_drive(par, state, k, wants) + SIGN[k] * tremor
-        drive += delayed(state, n, RING.reflex + k, par[PATIENT.stretch_delay] / period)
+        drive += felt(state, n, RING.reflex + k, par[PATIENT.stretch_delay], period)
         state[STATE.memory + (RING.drive + k) * n + int(state[STATE.newest])] = drive
         out[k] = limited(delayed(state, n, RING.drive + k, par[PATIENT.electromechanical_delay] / period))[0]
         state[STATE.active + k], state[STATE.fatigued + k] = advance_fatigue(
@@ -186,10 +197,6 @@ def step_effort(par, state, n, period, wanted, error, stretch, noise, out):
         )  # fmt: skip
     wandering = math.sqrt(2.0 * math.pi * par[PATIENT.tremor_width] * period) * noise
     state[STATE.phase] = (state[STATE.phase] + turn + wandering) % (2.0 * math.pi)
-    state[STATE.effort] = advance_effort(
-        state[STATE.effort], error, par[PATIENT.slacking_rate], par[PATIENT.effort_recovery],
-        par[PATIENT.least_effort], period,
-    )  # fmt: skip
 
 
 class Effort:
@@ -213,7 +220,7 @@ class Effort:
         if not feedback:
             self.numbers[PATIENT.feedback_gain] = 0.0
         self.state = np.zeros(state_size(period))
-        self._samples = samples(period)
+        self._samples = int(samples_in(period))
         self.reset(np.full(N, MINIMUM))
 
     def reset(self, wanted: np.ndarray) -> np.ndarray:
@@ -228,10 +235,10 @@ class Effort:
         return np.clip(drive, MINIMUM, 1.0)
 
     def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0) -> np.ndarray:
-        """Excitations over the coming control period [-], shape (6,).
+        """Excitations at the end of the coming control period [-], shape (6,).
 
         Args:
-            wanted: activations of the motor command now [-], shape (6,), in the order of MUSCLES.
+            wanted: activations of the motor command at its end [-], shape (6,), in the order of MUSCLES.
             error: psi - theta now [rad].
             rate: of the elbow now [rad/s], flexion positive.
 

@@ -19,7 +19,7 @@ from exo_env.actions import DRIVES, Drive, drive_inputs
 from exo_env.ecosystem import Ecosystem
 from exo_env.effort import Effort
 from exo_env.exoskeleton import AGONIST, WornExoskeleton
-from exo_env.human import MUSCLES, Arm, excitation_name
+from exo_env.human import MUSCLES, Arm
 from exo_env.motor_command import InternalModel, MotorCommand, plan_course
 from exo_env.need import Need
 from exo_env.patient import Patient
@@ -81,11 +81,12 @@ class Episode:
         self.arm = Arm(patient.person)
         self.worn = WornExoskeleton(ecosystem.device, self.arm, ecosystem.misalignment, ecosystem.guide)
         self.times = np.arange(round(duration / period) + 1) * period
+        self.course = repetition.course(self.times)
         self.wanted = self._wanted(duration)
-        known, course = self._known(self.ecosystem.weight), repetition.course(self.times)
-        self.need = Need.of(patient, known, ecosystem.device, course)
+        self.need = Need.of(patient, self._known(self.ecosystem.weight), ecosystem.device, self.course)
         self.effort = Effort(patient, period, generator)
         activations = self.effort.reset(self.wanted[0])
+        # Commands at the start; later ones are in the Plant.
         self.held = drive.start(self._holding_tension(start, activations))
         system = self.ecosystem.system(
             start,
@@ -100,24 +101,18 @@ class Episode:
         self.world = World(self.model, options)
         # Accelerations and reactions of the start, for the first reading.
         self.world.settle()
-        self._excitations = [excitation_name(m) for m in MUSCLES]
 
     @cached_property
     def names(self) -> dict[str, int]:
         """Place of each sensor's component in a reading."""
         return {name: k for k, (name, _) in enumerate(self.model.layout.outputs)}
 
-    def reference(self, times: np.ndarray) -> np.ndarray:
-        """psi, its rate and acceleration at times in rising order, shape (n, 3)."""
-        return self.repetition.course(times)
-
     def _wanted(self, duration: float) -> np.ndarray:
-        """The patient's command in the middle of each control period, shape (n, 6)."""
+        """The patient's command at each control time, shape (n, 6)."""
         load = self.patient.expected_load * self.ecosystem.weight
         times = np.linspace(0.0, duration, math.ceil(duration / PLANNING) + 1)
         command: MotorCommand = plan_course(self._known(load), times, self.repetition.course(times))
-        middle = self.times + 0.5 * self.period
-        return np.stack([np.interp(middle, times, column) for column in command.activations.T], axis=1)
+        return np.stack([np.interp(self.times, times, column) for column in command.activations.T], axis=1)
 
     def _known(self, load: float) -> InternalModel:
         """What somebody knows who expects this weight [kg]."""
@@ -129,12 +124,3 @@ class Episode:
         known, device = self._known(self.ecosystem.weight), self.ecosystem.device
         needed = known.resting_moment(start) + device.own_moment(start, float(np.linalg.norm(self.arm.gravity)))
         return (needed - known.muscle_moment(start, activations)) / device.moment_arm(AGONIST, start)
-
-    def advance(self, step: int, held: np.ndarray, excitations: np.ndarray) -> None:
-        """Hold the inputs over the control period that begins at times[step]; see `world.result`."""
-        self.held = held
-        for name, x in zip(self.drive.inputs, held, strict=True):
-            self.world.set_input(name, float(x))
-        for name, x in zip(self._excitations, excitations, strict=True):
-            self.world.set_input(name, float(x))
-        self.world.advance(float(self.times[step + 1]))

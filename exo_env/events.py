@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from exo_env.jit import compiled
 from exo_env.settings import Settings
+
+NOTHING, ANGLE, TENSION, REACTION, SOLVER = range(5)
+"""Codes of what ends an episode early."""
 
 
 class Limits(Settings):
@@ -33,20 +36,44 @@ class Limits(Settings):
         return self
 
 
-def event(limits: Limits, angle: float, tensions: Sequence[float] | np.ndarray, reaction: float) -> str | None:
-    """A sentence on the limit that is exceeded, or None.
+    def numbers(self) -> np.ndarray:
+        """For compiled code: angles [rad], tension and reaction [N]."""
+        return np.array([math.radians(self.lowest_deg), math.radians(self.highest_deg), self.tension, self.reaction])
+
+
+@compiled
+def event_code(limits, angle, agonist, antagonist, reaction):
+    """The limit that is exceeded, or NOTHING.
 
     Args:
-        limits: of this environment.
+        limits: `Limits.numbers`.
         angle: of the elbow [rad].
-        tensions: of both ropes [N].
+        agonist: tension [N].
+        antagonist: tension [N].
         reaction: size of the elbow's reaction force [N].
     """
-    degrees = math.degrees(angle)
-    if not limits.lowest_deg <= degrees <= limits.highest_deg:
-        return f"The elbow is at {degrees:.1f} deg, outside {limits.lowest_deg:g} to {limits.highest_deg:g} deg."
-    if max(tensions) > limits.tension:
-        return f"A rope pulls with {max(tensions):.0f} N; {limits.tension:g} N is the limit."
-    if reaction > limits.reaction:
+    if not limits[0] <= angle <= limits[1]:
+        return ANGLE
+    if not max(agonist, antagonist) <= limits[2]:
+        return TENSION
+    return NOTHING if reaction <= limits[3] else REACTION
+
+
+def event(code: int, limits: Limits, angle: float, tension: float, reaction: float) -> str | None:
+    """The sentence on an event of `event_code`, None for NOTHING.
+
+    Args:
+        code: of the event.
+        limits: of this environment.
+        angle: of the elbow [rad].
+        tension: largest of both ropes [N].
+        reaction: size of the elbow's reaction force [N].
+    """
+    if code == ANGLE:
+        low, high = limits.lowest_deg, limits.highest_deg
+        return f"The elbow is at {math.degrees(angle):.1f} deg, outside {low:g} to {high:g} deg."
+    if code == TENSION:
+        return f"A rope pulls with {tension:.0f} N; {limits.tension:g} N is the limit."
+    if code == REACTION:
         return f"The elbow's reaction force is {reaction:.0f} N; {limits.reaction:g} N is the limit."
     return None

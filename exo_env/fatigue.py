@@ -13,7 +13,7 @@ not the muscle's: what the muscle receives is min(T, 1 - M_F), and the muscle ha
 
 from __future__ import annotations
 
-from numba import njit
+from exo_env.jit import compiled
 
 L = 10.0
 """Speed at which units are recruited and let go [1/s]."""
@@ -23,7 +23,7 @@ LONGEST_STEP = 0.02
 """Longest step of the integration [s]: a fifth of 1/L, where four stages are accurate to 1e-5."""
 
 
-@njit(cache=True)
+@compiled
 def fatigue_rates(active, fatigued, wanted, fatigue_rate, recovery_rate):
     """(M_A', M_F') [1/s]."""
     missing = wanted - active
@@ -33,7 +33,7 @@ def fatigue_rates(active, fatigued, wanted, fatigue_rate, recovery_rate):
     return L * missing - lost, lost - recovery_rate * fatigued
 
 
-@njit(cache=True)
+@compiled
 def advance_fatigue(active, fatigued, wanted, fatigue_rate, recovery_rate, rest_recovery, duration):
     """(M_A, M_F) after a time [s] under a constant wanted share: classical Runge-Kutta steps of order 4."""
     recovery = recovery_rate * rest_recovery if wanted < REST else recovery_rate

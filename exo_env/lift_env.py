@@ -11,18 +11,22 @@ import numpy as np
 from gymnasium import spaces
 
 from dms_core import SolverOptions
+from dms_core.assembly.arena import Packed
 from dms_core.errors import InputError, choices
 from dms_core.results import Result
-from exo_env import rewards
+from dms_core.simulation.step_control import DONE
 from exo_env.actions import checked_action, drive
+from exo_env.control_period import READING, STATUS, Plant, begin, finish, run_period
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
-from exo_env.events import Limits, event
+from exo_env.events import NOTHING, SOLVER, Limits, event
 from exo_env.lift_settings import load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
+from exo_env.plant import plant_of
 from exo_env.population import Source, population
 from exo_env.readout import Readout
 from exo_env.repetition import Repetition, Repetitions
+from exo_env.rewards import TERMS, Weights
 from exo_env.scene import Scene
 
 OPTIONS = ("patient", "load", "reference", "initial_angle_deg")
@@ -169,8 +173,9 @@ class ElbowLiftEnv(gymnasium.Env):
         self.repetitions = Repetitions.of(reference)
         self.ecosystem = Ecosystem(device=worn_device(exoskeleton))
         self.action_mode, self.drive = action_mode, drive(action_mode, dict(drive_settings or {}))
-        self.weights, self.limits = rewards.Weights(**(reward_weights or {})), Limits(**(limits or {}))
-        self.solver = SolverOptions(rtol=rtol, h_min=SMALLEST_STEP, max_steps=MOST_STEPS)
+        self.weights, self.limits = Weights(**(reward_weights or {})), Limits(**(limits or {}))
+        self.solver = SolverOptions(rtol=rtol, h_min=SMALLEST_STEP, max_steps=MOST_STEPS, method="sdirk2")
+        self._weights = self.weights.model_dump()
         self.observer = Observer(observation, noise, self.period)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
@@ -207,12 +212,10 @@ class ElbowLiftEnv(gymnasium.Env):
         self._over, self._episode = True, None
         self._begin(options or {})
         self._over = False
-        self._readout.update(0)
-        observation = self.observer.observe(self._readout.channels(self._action), self.np_random, first=True)
-        self._last = observation
+        begin(self._packed.table)
         if self.render_mode == "human":
             self.render()
-        return observation.copy(), self._start_info()
+        return self._plant.observation.astype(np.float32), self._start_info()
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         """Draw an episode; what is fixed draws from a generator of its own, so as not to shift what is not."""
@@ -236,9 +239,6 @@ class ElbowLiftEnv(gymnasium.Env):
         if not within(start_deg, low, high):
             raise InputError(f"initial_angle_deg = {start_deg!r}; a number from {low:g} to {high:g} is wanted.")
         self._episode = self._simulated(patient, load, repetition, math.radians(start_deg))
-        self._step = 0
-        self._action = np.zeros(2)
-        self._result = Result.SUCCESS
 
     def _simulated(self, patient: Any, load: float, repetition: Repetition, start: float) -> Episode:
         episode = Episode(
@@ -246,7 +246,9 @@ class ElbowLiftEnv(gymnasium.Env):
             repetition=repetition, start=start, period=self.period, duration=self.duration, generator=self.np_random,
             options=self.solver,
         )  # fmt: skip
-        self._readout = Readout(episode)
+        self._packed = plant_of(episode, self.observer, self.weights, self.limits, self.np_random)
+        self._plant: Plant = self._packed.values
+        self._readout = Readout(episode, self._plant)
         return episode
 
     @property
@@ -273,31 +275,32 @@ class ElbowLiftEnv(gymnasium.Env):
         episode, used = self.episode, checked_action(action)
         if self._over:
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
-        k, before, true = self._step, self._action, self._readout
-        excitations = episode.effort.step(episode.wanted[k], error=-true.error, rate=true.rate)
-        episode.advance(k, self.drive.held(used, episode.held, self.period), excitations)
-        self._step, self._action, self._result = k + 1, used, episode.world.result
-        happened = self._failure()
-        if happened is None:
-            true.update(k + 1)
-            self._last = self.observer.observe(true.channels(used), self.np_random, first=False)
-            happened = event(self.limits, true.angle, true.tensions, true.reaction)
-        found = rewards.terms(
-            error=true.error, moment=true.exo_moment, lacking=float(episode.need.lacking[k + 1]),
-            scale=episode.need.scale, reaction=true.reaction, action=used, before=before,
-            unsafe=happened is not None,
-        )  # fmt: skip
-        terminated, truncated = happened is not None, k + 1 == len(episode.times) - 1
+        plant, status = self._plant, self._plant.status
+        if run_period(self._packed.table, used) != DONE:
+            self._rescue(episode)
+        terminated, truncated = bool(status[STATUS.event] != NOTHING), bool(status[STATUS.step] == status[STATUS.steps])
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
-        return self._last.copy(), rewards.total(found, self.weights), terminated, truncated, self._info(found, happened)
+        return plant.observation.astype(np.float32), float(plant.reward[0]), terminated, truncated, self._info()
 
-    def _failure(self) -> str | None:
-        """The sentence of a solver that gave up, or None."""
-        if self._result is not Result.SUCCESS:
-            return f"{self._result.value} Stopped at t = {self.episode.world.time:.6g} s."
-        return None
+    def _rescue(self, episode: Episode) -> None:
+        """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
+        world = episode.world
+        result = world.advance(float(episode.times[self._plant.status[STATUS.step] + 1]))
+        if result is Result.SUCCESS:
+            self._plant.status[STATUS.code] = DONE
+            self._plant = self._plant._replace(model=world.tables, world=world.packed)
+            self._packed = Packed(self._plant)
+            self._readout = Readout(episode, self._plant)
+        finish(self._packed.table)
+
+    def _happened(self) -> str | None:
+        """The sentence on what ended the episode, or None."""
+        code, r = self._plant.status[STATUS.event], self._readout
+        if code == SOLVER:
+            return f"{self.episode.world.result.value} Stopped at t = {self.episode.world.time:.6g} s."
+        return event(int(code), self.limits, r.angle, float(max(r.tensions)), r[READING.reaction])
 
     def readings(self) -> dict[str, float]:
         """Everything of the paper's figures 9 to 13 at the present time, without noise: every sensor of the model.
@@ -323,17 +326,18 @@ class ElbowLiftEnv(gymnasium.Env):
             "initial_angle_deg": math.degrees(self._readout.angle),
         }
 
-    def _info(self, found: dict[str, float], happened: str | None) -> dict[str, Any]:
+    def _info(self) -> dict[str, Any]:
         """Of a step."""
+        plant, r, happened = self._plant, self._readout, self._happened()
         info: dict[str, Any] = {
-            "reward_terms": dict(found),
-            "reward_weights": self.weights.model_dump(),
-            "time": float(self.episode.times[self._step]),
-            "tracking_error_deg": math.degrees(self._readout.error),
-            "device_share": self._readout.share,
+            "reward_terms": dict(zip(TERMS, plant.terms[0].tolist(), strict=True)),
+            "reward_weights": self._weights.copy(),
+            "time": float(self.episode.times[plant.status[STATUS.step]]),
+            "tracking_error_deg": math.degrees(r.error),
+            "device_share": r[READING.share],
             "effort": self.episode.effort.effort,
-            "elbow_reaction": self._readout.reaction,
-            "solver_failed": self._result is not Result.SUCCESS,
+            "elbow_reaction": r[READING.reaction],
+            "solver_failed": bool(plant.status[STATUS.event] == SOLVER),
         }
         if happened is not None:
             info["event"] = happened
@@ -344,7 +348,7 @@ class ElbowLiftEnv(gymnasium.Env):
         from exo_env.staging import staged
 
         episode, r = self.episode, self._readout
-        return staged(episode, r.angle, r.hinge, r.reference, r.tensions, r.activations, self._label())
+        return staged(episode, r.angle, r[READING.hinge], r.reference, r.tensions, r.activations, self._label())
 
     def _label(self) -> str:
         """Names the patient in a picture."""

@@ -6,6 +6,7 @@ channel's scale, so that observations are of order 1 (`Channel.scale` and `unit`
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,6 +16,7 @@ from pydantic import Field
 
 from dms_core.errors import InputError, choices
 from exo_env.human import MUSCLES
+from exo_env.jit import compiled
 from exo_env.patient import PATIENT, Patient
 from exo_env.settings import Settings
 from exo_env.slacking import MOST_EFFORT
@@ -115,6 +117,13 @@ GROUPS: dict[str, list[Channel]] = {
 }
 """Channels of each group, in the order of the observation."""
 
+_ALL = [c for channels in GROUPS.values() for c in channels]
+_STARTS = np.concatenate([[0], np.cumsum([len(c.labels) for c in _ALL])])
+TRUTH_SIZE = int(_STARTS[-1])
+TRUTH: Any = namedtuple("TRUTH", [c.name for c in _ALL])(*map(int, _STARTS[:-1]))
+"""Place of each channel in the vector of all."""
+DEVIATION, QUANTUM, SCALE, LOW, HIGH, WHOLE, PART = range(7)
+
 
 class Observer:
     """Turns true readings into observations.
@@ -141,14 +150,18 @@ class Observer:
         def spread(values: list[float]) -> np.ndarray:
             return np.repeat(np.array(values, dtype=float), sizes)
 
-        self._deviation = spread([i.deviation for i in found])
-        self._quantum = spread([i.quantum for i in found])
-        self._scale = spread([c.scale for _, c in self.channels])
-        self._low, self._high = spread([c.low for _, c in self.channels]), spread([c.high for _, c in self.channels])
-        delay = spread([i.delay for i in found]) / period
-        self._whole, self._part = np.floor(delay).astype(int), delay - np.floor(delay)
-        self._memory = np.zeros((int(self._whole.max()) + 2, self.size))
-        self._columns = np.arange(self.size)
+        delay = np.array([i.delay for i in found]) / period
+        whole = np.floor(delay)
+        self.sensors = np.stack(
+            [
+                spread([i.deviation for i in found]), spread([i.quantum for i in found]),
+                spread([c.scale for _, c in self.channels]), spread([c.low for _, c in self.channels]),
+                spread([c.high for _, c in self.channels]), spread(list(whole)), spread(list(delay - whole)),
+            ],
+            axis=1,
+        )  # fmt: skip
+        """Columns DEVIATION, QUANTUM, SCALE, LOW, HIGH, WHOLE (periods of delay) and PART (of another)."""
+        self.columns = np.concatenate([getattr(TRUTH, c.name) + np.arange(len(c.labels)) for _, c in self.channels])
 
     def _slices(self) -> tuple[Slice, ...]:
         start, found = 0, []
@@ -174,25 +187,44 @@ class Observer:
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest observation, shape (size,), float32."""
-        return (self._low / self._scale).astype(np.float32), (self._high / self._scale).astype(np.float32)
+        low, high, scale = (self.sensors[:, k] for k in (LOW, HIGH, SCALE))
+        return (low / scale).astype(np.float32), (high / scale).astype(np.float32)
 
-    def reset(self, reading: Mapping[str, Any]) -> None:
-        """As if this reading had been true for long."""
-        self._memory[:] = self._row(reading)
+    def memory(self) -> np.ndarray:
+        """For the past readings of one world, shape (depth, size)."""
+        return np.zeros((int(self.sensors[:, WHOLE].max()) + 2, self.size))
 
-    def observe(self, reading: Mapping[str, Any], generator: np.random.Generator, *, first: bool) -> np.ndarray:
-        """The observation of a true reading (name of each channel to its values [unit]), float32, shape (size,)."""
-        if first:
-            self.reset(reading)
-        else:
-            self._memory[1:] = self._memory[:-1].copy()
-            self._memory[0] = self._row(reading)
-        near, far = self._memory[self._whole, self._columns], self._memory[self._whole + 1, self._columns]
-        shown = near + self._part * (far - near) + self._deviation * generator.standard_normal(self.size)
-        coarse = self._quantum > 0.0
-        shown[coarse] = np.round(shown[coarse] / self._quantum[coarse]) * self._quantum[coarse]
-        low, high = self.limits
-        return np.clip((np.clip(shown, self._low, self._high) / self._scale).astype(np.float32), low, high)
 
-    def _row(self, reading: Mapping[str, Any]) -> np.ndarray:
-        return np.concatenate([np.atleast_1d(reading[c.name]) for _, c in self.channels])
+def truth_of(reading: Mapping[str, Any]) -> np.ndarray:
+    """Values of all channels [unit of the channel] from those that are given by name; the rest is 0."""
+    found = np.zeros(TRUTH_SIZE)
+    for name, values in reading.items():
+        start = getattr(TRUTH, name)
+        found[start : start + np.size(values)] = values
+    return found
+
+
+@compiled
+def imperfect(truth, columns, sensors, memory, noise, first, out):
+    """What sensors make of the truth, in their scales.
+
+    Args:
+        truth: every channel [unit of the channel].
+        columns: places in it of what is observed, shape (n,).
+        sensors: `Observer.sensors`, shape (n, 7).
+        memory: past readings, newest first, shape (depth, n); changed.
+        noise: standard normal numbers, shape (n,).
+        first: as if the truth had been so for long.
+        out: shape (n,).
+    """
+    depth = memory.shape[0]
+    for i in range(columns.shape[0]):
+        for k in range(depth - 1, 0, -1):
+            memory[k, i] = truth[columns[i]] if first else memory[k - 1, i]
+        memory[0, i] = truth[columns[i]]
+        whole, s = int(sensors[i, WHOLE]), sensors[i]
+        near, far = memory[whole, i], memory[whole + 1, i]
+        shown = near + s[PART] * (far - near) + s[DEVIATION] * noise[i]
+        if s[QUANTUM] > 0.0:
+            shown = round(shown / s[QUANTUM]) * s[QUANTUM]
+        out[i] = min(max(shown, s[LOW]), s[HIGH]) / s[SCALE]

@@ -145,7 +145,7 @@ class Picture:
             self.canvas.polygon(outline, SKIN)
 
     def _ghost(self, view: View, scene: Scene, upper_arm: float) -> np.ndarray:
-        """Outline of the forearm where the reference wants it; its turn is drawn as if the elbow axis faced the viewer."""
+        """Outline of the forearm where the reference wants it, turned as if the elbow axis faced the viewer."""
         r = view.scale * upper_arm
         turn = scene.reference_angle - scene.elbow_angle
         c, s = np.cos(turn), np.sin(turn)

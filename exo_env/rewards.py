@@ -30,8 +30,11 @@ import math
 import numpy as np
 from pydantic import Field
 
+from exo_env.jit import compiled
 from exo_env.settings import Settings
 
+TERMS = ("tracking", "assistance", "smoothness", "reaction", "unsafe")
+"""In the order of the compiled code."""
 TRACKING_WIDTH = math.radians(5.0)
 """Error that earns 1/e [rad]."""
 REACTION_THRESHOLD, MOST = 500.0, 2.0
@@ -47,19 +50,14 @@ class Weights(Settings):
     reaction: float = Field(default=0.2, ge=0.0, le=1e6)
     unsafe: float = Field(default=100.0, ge=0.0, le=1e6)
 
+    def numbers(self) -> np.ndarray:
+        """In the order of TERMS, shape (5,)."""
+        return np.array([getattr(self, name) for name in TERMS])
 
-def terms(
-    *,
-    error: float,
-    moment: float,
-    lacking: float,
-    scale: float,
-    reaction: float,
-    action: np.ndarray,
-    before: np.ndarray,
-    unsafe: bool,
-) -> dict[str, float]:
-    """Value of each term [-].
+
+@compiled
+def term_values(error, moment, lacking, scale, reaction, action, before, unsafe, out):
+    """Value of each term [-], in the order of TERMS.
 
     Args:
         error: elbow angle minus reference [rad].
@@ -70,16 +68,10 @@ def terms(
         action: now, shape (2,).
         before: the action before, shape (2,).
         unsafe: an event ends the episode.
+        out: shape (5,).
     """
-    return {
-        "tracking": math.exp(-((error / TRACKING_WIDTH) ** 2)),
-        "assistance": -min(max(moment - lacking, -moment, 0.0) / scale, MOST),
-        "smoothness": -0.25 * float(np.mean((action - before) ** 2)),
-        "reaction": -min(max(reaction / REACTION_THRESHOLD - 1.0, 0.0), MOST),
-        "unsafe": -1.0 if unsafe else 0.0,
-    }
-
-
-def total(values: dict[str, float], weights: Weights) -> float:
-    """The reward."""
-    return float(sum(getattr(weights, name) * x for name, x in values.items()))
+    out[0] = math.exp(-((error / TRACKING_WIDTH) ** 2))
+    out[1] = -min(max(moment - lacking, -moment, 0.0) / scale, MOST)
+    out[2] = -0.125 * ((action[0] - before[0]) ** 2 + (action[1] - before[1]) ** 2)
+    out[3] = -min(max(reaction / REACTION_THRESHOLD - 1.0, 0.0), MOST)
+    out[4] = -1.0 if unsafe else 0.0

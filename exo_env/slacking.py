@@ -22,13 +22,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from exo_env.jit import compiled
 
 MOST_EFFORT = 2.0
 """Largest multiple of what was planned [-]."""
 
 
-@njit(cache=True)
+@compiled
 def advance_effort(effort, error, rate, recovery, least, duration):
     """Effort s after a time [s] under a constant error [rad]; exact within the limits."""
     if rate > 0.0:

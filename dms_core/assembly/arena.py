@@ -34,8 +34,8 @@ class Packed:
         self.table = np.zeros((len(values), 3), np.int64)
         self._inner: list[Packed] = []
         for k, value in enumerate(values):
-            if isinstance(value, tuple):
-                inner = Packed(value)
+            if isinstance(value, tuple | Packed):
+                inner = value if isinstance(value, Packed) else Packed(value)
                 self._inner.append(inner)
                 self.table[k] = (inner.table.ctypes.data, *inner.table.shape)
             elif isinstance(value, np.ndarray):
@@ -72,6 +72,12 @@ _int64 = _pointer_to(types.int64)
 _int32 = _pointer_to(types.int32)
 _uint32 = _pointer_to(types.uint32)
 _bool = _pointer_to(types.boolean)
+
+
+@compiled
+def table_at(address, rows):
+    """The packed table with that address and number of fields."""
+    return carray(_int64(address), (rows, 3))
 
 
 @compiled

@@ -18,7 +18,7 @@ from dms_core.assembly.residual import (
     evaluate_newton,
     evaluate_rates,
 )
-from dms_core.assembly.sensing import Partials, composition, evaluate_partials, measure
+from dms_core.assembly.sensing import Partials, Sensing, composition, evaluate_partials, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
 from dms_core.assembly.tables import Calls, Signals, Work, all_calls, moving_calls, new_work, signal_tables
 from dms_core.assembly.welds import Welds, find_welds, recover
@@ -150,6 +150,9 @@ class Model:
             self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0))
         self._composed = Packed(composition(layout))
         self._sensor_work = Packed(self.new_work())
+        self.sensing = Packed(
+            Sensing(self._dynamics, self._constraints, self._sensors, self._composed, self._sensor_work)
+        )
         read = {k for e in self._composed.values.constraint if e >= 0 for k in self._rows_of(e)}
         self._reads_welds = bool(read & set(self.welds.rows))
 
@@ -330,10 +333,7 @@ class Model:
         self._measure(inner(world, STATE.signals), t, q, v, a, lam, behind, y)
 
     def _measure(self, signals: np.ndarray, t, q, v, a, lam, behind, y) -> None:  # noqa: ANN001
-        measure(
-            self._dynamics.table, self._constraints.table, self._sensors.table, self._composed.table, signals,
-            self._sensor_work.table, t, q, v, a, lam, behind, y,
-        )  # fmt: skip
+        measure(self.sensing.table, signals, t, q, v, a, lam, behind, y)
 
     def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
         """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense."""

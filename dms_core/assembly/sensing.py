@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import fields, floats, indices, ints, matrix
+from dms_core.assembly.arena import Packed, fields, floats, indices, inner, ints, matrix
 from dms_core.assembly.layout import Layout
 from dms_core.assembly.residual import (
     CALLS,
@@ -47,6 +47,16 @@ class Composition(NamedTuple):
     source_ptr: np.ndarray
 
 
+class Sensing(NamedTuple):
+    """What it takes to read the sensors of a state, packed; `work` is for one reader at a time."""
+
+    dynamics: Packed
+    constraints: Packed
+    sensors: Packed
+    composed: Packed
+    work: Packed
+
+
 class Partials(NamedTuple):
     """Derivatives of all sensor components at one state, dense.
 
@@ -63,7 +73,7 @@ class Partials(NamedTuple):
     u: np.ndarray
 
 
-COMPOSITION, PARTIALS = fields(Composition), fields(Partials)
+COMPOSITION, PARTIALS, SENSING = fields(Composition), fields(Partials), fields(Sensing)
 
 
 def composition(layout: Layout) -> Composition:
@@ -338,17 +348,27 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
 
 
 @compiled
-def measure(dynamics, constraints, sensors, composed, signals, w, t, q, v, a, lam, behind, y):
-    """y[k] at the states q[k], v[k], a[k], lam[k], t[k]; behind[k] takes the inputs behind a jump at t[k]."""
+def read_sensors(sensing, signals, t, q, v, a, lam, behind, y):
+    """y at one state, all vectors; `behind` takes the inputs behind a jump at t."""
+    w = inner(sensing, SENSING.work)
     q_w, v_w, a_w, lam_w, y_w = (
         floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam), floats(w, WORK.y),
     )  # fmt: skip
+    for i in range(q.shape[0]):
+        q_w[i], v_w[i], a_w[i] = q[i], v[i], a[i]
+    for i in range(lam.shape[0]):
+        lam_w[i] = lam[i]
+    evaluate_inputs(signals, t, not behind, w)
+    evaluate_sensors(
+        inner(sensing, SENSING.dynamics), inner(sensing, SENSING.constraints), inner(sensing, SENSING.sensors),
+        inner(sensing, SENSING.composed), w,
+    )  # fmt: skip
+    for i in range(y.shape[0]):
+        y[i] = y_w[i]
+
+
+@compiled
+def measure(sensing, signals, t, q, v, a, lam, behind, y):
+    """y[k] at the states q[k], v[k], a[k], lam[k], t[k]; behind[k] takes the inputs behind a jump at t[k]."""
     for k in range(t.shape[0]):
-        for i in range(q.shape[1]):
-            q_w[i], v_w[i], a_w[i] = q[k, i], v[k, i], a[k, i]
-        for i in range(lam.shape[1]):
-            lam_w[i] = lam[k, i]
-        evaluate_inputs(signals, t[k], not behind[k], w)
-        evaluate_sensors(dynamics, constraints, sensors, composed, w)
-        for i in range(y.shape[1]):
-            y[k, i] = y_w[i]
+        read_sensors(sensing, signals, t[k], q[k], v[k], a[k], lam[k], behind[k], y[k])

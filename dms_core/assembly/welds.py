@@ -23,7 +23,6 @@ from dms_core.model.constraints.fixed import Fixed
 from dms_core.model.element import GROUND
 
 
-
 class Welds(NamedTuple):
     """What does not move, for compiled code."""
 
@@ -87,8 +86,8 @@ def _fixed_bodies(layout: Layout) -> set[str]:
 def recover(dynamics, constraints, welds, signals, w, t, q, v, a, lam, behind):
     """Fill in lam[k] of the rows that were left out, at the states q[k], v[k], a[k] and times t[k]."""
     q_w, v_w, a_w, lam_w = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
-    coordinates, rows, inverse = indices(welds, WELDS.coordinates), indices(welds, WELDS.rows), matrix(welds, WELDS.inverse)
-    r2 = floats(w, WORK.r2)
+    coordinates, rows = indices(welds, WELDS.coordinates), indices(welds, WELDS.rows)
+    inverse, r2 = matrix(welds, WELDS.inverse), floats(w, WORK.r2)
     for k in range(t.shape[0]):
         for i in range(q.shape[1]):
             q_w[i], v_w[i], a_w[i] = q[k, i], v[k, i], a[k, i]

@@ -108,8 +108,18 @@ class World:
         self._tables: Packed = self.model.tables
         self._world = self.model.new_state()
         self.state: State = self._world.values
-        self._buffer = np.zeros((BUFFER_ROWS, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
+        self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
+
+    @property
+    def tables(self) -> Packed:
+        """Constant tables (a packed Tables) that this world is solved with, for compiled code."""
+        return self._tables
+
+    @property
+    def packed(self) -> Packed:
+        """The mutable state (a packed State), for compiled code."""
+        return self._world
 
     @property
     def time(self) -> float:
@@ -233,6 +243,7 @@ class Simulation(World):
 
     def __init__(self, model: Model | System, options: SolverOptions | None = None) -> None:
         super().__init__(model, options)
+        self._buffer = np.zeros((BUFFER_ROWS, self._buffer.shape[1]))
         self._rows: list[np.ndarray] = []
         self._settings: dict[int, list[tuple[float, float]]] = {}
 

@@ -214,21 +214,26 @@ def land(s, stop):
 
 @compiled
 def advance(m, s, o, t_end, record, recorded):
-    """Step until t_end; gives (code, number of rows recorded). BUFFER_FULL asks to be called again with room."""
-    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
+    """Step until t_end; gives (code, number of rows recorded). BUFFER_FULL asks to be called again with room.
+
+    Nothing is recorded where the record has no rows at all.
+    """
+    clock, count, kept = floats(s, STATE.clock), ints(s, STATE.counts), record.shape[0] > 0
     while clock[T] < t_end:
-        if recorded + 2 > record.shape[0]:
+        if kept and recorded + 2 > record.shape[0]:
             return BUFFER_FULL, recorded
         if count[STEPS] >= o.max_steps:
             return TOO_MANY_STEPS, recorded
         if count[RESTART] == 1:
             if not restart(m, s, o):
                 return RATES_FAILED, recorded
-            record_point(s, record, recorded)
-            recorded += 1
+            if kept:
+                record_point(s, record, recorded)
+                recorded += 1
         code = one_step(m, s, o, next_stop(s, t_end))
         if code != DONE:
             return code, recorded
-        record_point(s, record, recorded)
-        recorded += 1
+        if kept:
+            record_point(s, record, recorded)
+            recorded += 1
     return DONE, recorded

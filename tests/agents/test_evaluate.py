@@ -8,8 +8,9 @@ import pytest
 
 from agents.__main__ import main
 from agents.baselines import POLICIES, policy
-from agents.evaluate import evaluate, patient_seeds
+from agents.evaluate import evaluate, patient_seeds, table
 from agents.measures import MEASURES
+from agents.statistics import interquartile_mean
 
 SHORT = {"episode_duration": 0.6}
 """Until the lift has begun; a whole episode tells no more and takes ten times as long."""
@@ -30,6 +31,17 @@ def test_every_policy_meets_the_same_patients():
     met = [[(e["seed"], e["load"], e["patient"], e["reference"]) for e in p["episodes"]] for p in found.values()]
     assert all(m == met[0] for m in met)
     assert met[0][0] != met[0][1]
+
+
+def test_who_can_do_something_is_summed_up_apart():
+    weak = {"base": "stroke_severe", "fields": {"maximum_activation_flexors": {"uniform": [0.0, 0.06]}}}
+    found = evaluate([policy("none"), policy("pid")], weak, 6, 2, **SHORT)
+    for one in found["policies"].values():
+        able = [e["measures"]["return"] for e in one["episodes"] if e["ability"] >= 0.2]
+        assert 0 < len(able) < 6
+        assert one["summary_able"]["return"]["count"] == len(able)
+        assert one["summary_able"]["return"]["value"] == pytest.approx(interquartile_mean(np.array(able)))
+    assert f"of the {len(able)} with ability from 0.2" in table(found)
 
 
 def test_order_of_policies_does_not_matter():

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from dms_core.results import Result
+from dms_core.simulation.state import Options
 from exo_env.actions import RopeTension
 from exo_env.lift_env import ElbowLiftEnv
-from exo_env.observations import Observer
-from exo_env.readout import device_share
+from exo_env.observations import Observer, imperfect, truth_of
+from exo_env.control_period import device_share
 from exo_env.repetition import Repetition
-from exo_env.rewards import Weights, terms, total
+from exo_env.rewards import TERMS, Weights, term_values
 from exo_env.soak import soak
 
 LIMP = {"maximum_activation_flexors": 0.0, "maximum_activation_extensors": 0.0}
@@ -56,13 +57,14 @@ def test_tension_follows_with_rate_limit_and_lag():
     env = ElbowLiftEnv(patient={}, limits={"lowest_deg": -10.0})
     env.reset(seed=0, options={"load": 1.0})
     drive, period = RopeTension(), 0.02
-    found, held = env.readings()["antagonist_tension"], 0.0
+    found, held, tau = env.readings()["antagonist_tension"], 0.0, drive.time_constant
     assert found == 0.0
     for _ in range(4):
         env.step(np.array([-0.6, 0.5]))
-        held = min(held + drive.rate_limit * period, 75.0)
-        found = held + (found - held) * math.exp(-period / drive.time_constant)
-        # The lag's exact answer to a held command; rtol 1e-2 of 100 N nominal allows an error of 0.1 N a step or so.
+        before, held = held, min(held + drive.rate_limit * period, 75.0)
+        late = tau * (held - before) / period
+        found = held - late + (found - before + late) * math.exp(-period / tau)
+        # The lag's exact answer to a ramp; rtol 1e-2 of 100 N nominal allows an error of 0.1 N a step or so.
         assert env.readings()["antagonist_tension"] == pytest.approx(found, abs=1.0)
 
 
@@ -70,10 +72,15 @@ def test_setpoint_goes_through_the_filter():
     env = ElbowLiftEnv(action_mode="pid_setpoint", patient=LIMP, rtol=1e-4, reference={"rest": 5.0}, load=1.0)
     env.reset(seed=0)
     w, errors = 20.0, []
+
+    def integral(t):
+        """Of the filter's answer to a unit step, 1 - (1 + w t) exp(-w t)."""
+        return t - (2.0 - (2.0 + w * t) * math.exp(-w * t)) / w
+
     for k in range(1, 31):
         env.step(np.array([1.0, 1.0]))
-        t = 0.02 * k
-        wanted = 0.2 * (1.0 - (1.0 + w * t) * math.exp(-w * t))
+        # The setpoint rises over the first period.
+        wanted = 0.2 * (integral(0.02 * k) - integral(0.02 * (k - 1))) / 0.02
         r = env.readings()
         # The Tracking sensor's error is reference + filtered setpoint - hinge angle.
         assert r["tracking.error"] + r["exo_angle.angle"] - r["reference"] == pytest.approx(wanted, abs=1e-4)
@@ -119,14 +126,19 @@ def test_noise_delay_and_quantisation():
                "reference_rate": 0.0, "preview": [0.0] * 3, "last_action": [0.0, 0.0]}  # fmt: skip
     spec = {"angle": {"delay": 0.03}, "rate": {"quantum": 0.25}, "guide_force": {"deviation": 2.0}}
     observer, generator = Observer(["device"], spec, 0.02), np.random.default_rng(0)
-    observer.observe(reading, generator, first=True)
-    rows = [
-        observer.observe(reading | {"angle": 1.0 + k, "rate": 0.1 + 0.1 * k}, generator, first=False) for k in (1, 2, 3)
-    ]
+    memory, out = observer.memory(), np.zeros(observer.size)
+
+    def observed(changed, first=False):
+        noise = generator.standard_normal(observer.size)
+        imperfect(truth_of(reading | changed), observer.columns, observer.sensors, memory, noise, first, out)
+        return out.copy()
+
+    observed({}, first=True)
+    rows = [observed({"angle": 1.0 + k, "rate": 0.1 + 0.1 * k}) for k in (1, 2, 3)]
     # 1.5 periods late, between two samples; the range ends at 3.
     np.testing.assert_allclose([row[0] for row in rows], [1.0, 1.5, 2.5])
     np.testing.assert_allclose([row[1] for row in rows], [0.25, 0.25, 0.5])
-    many = np.array([observer.observe(reading, generator, first=False)[4] * 10.0 for _ in range(4000)])
+    many = np.array([observed({})[4] * 10.0 for _ in range(4000)])
     # Standard error of a deviation from 4000 numbers: 2 / sqrt(8000) = 0.022; four of them.
     assert many.std() == pytest.approx(2.0, abs=0.09) and abs(many.mean()) < 0.13
 
@@ -140,17 +152,23 @@ def test_reward_is_the_sum_of_its_terms(env):
     assert found["smoothness"] == pytest.approx(-(0.5**2 + 0.9**2) / 8.0)
 
 
-def test_terms():
+def _terms(**changed):
     quiet = {"error": 0.0, "moment": 0.0, "lacking": 1.0, "scale": 4.0, "reaction": 400.0, "action": HOLD,
              "before": HOLD, "unsafe": False}  # fmt: skip
-    assert total(terms(**quiet), Weights()) == 1.0
+    out = np.zeros(len(TERMS))
+    term_values(*(quiet | changed).values(), out)
+    return dict(zip(TERMS, out, strict=True))
+
+
+def test_terms():
+    assert Weights().numbers() @ list(_terms().values()) == 1.0
     # What is lacking may be given for nothing; what is beyond it, and what pulls down, may not.
-    helped = [terms(**(quiet | {"moment": m}))["assistance"] for m in (1.0, 3.0, -3.0, 1e3, -1e3)]
+    helped = [_terms(moment=m)["assistance"] for m in (1.0, 3.0, -3.0, 1e3, -1e3)]
     assert helped == [0.0, -0.5, -0.75, -2.0, -2.0]
-    assert terms(**(quiet | {"reaction": 750.0}))["reaction"] == -0.5
-    assert terms(**(quiet | {"before": -HOLD}))["smoothness"] == -1.0
-    assert terms(**(quiet | {"unsafe": True}))["unsafe"] == -1.0
-    assert terms(**(quiet | {"error": math.radians(5.0)}))["tracking"] == pytest.approx(math.exp(-1.0))
+    assert _terms(reaction=750.0)["reaction"] == -0.5
+    assert _terms(before=-HOLD)["smoothness"] == -1.0
+    assert _terms(unsafe=True)["unsafe"] == -1.0
+    assert _terms(error=math.radians(5.0))["tracking"] == pytest.approx(math.exp(-1.0))
 
 
 def test_share():
@@ -196,8 +214,8 @@ def test_limits_end_an_episode(limits, word):
 def test_a_failed_solver_ends_the_episode_with_its_sentence(env):
     env.reset(seed=0)
     before, *_ = env.step(HOLD)
-    world = env.episode.world
-    world._numbers = world._numbers._replace(max_steps=1)
+    env._plant.options[Options._fields.index("max_steps")] = 1
+    env.episode.world._numbers = env.episode.world._numbers._replace(max_steps=1)
     observation, reward, terminated, _, info = env.step(HOLD)
     assert terminated and info["solver_failed"] and Result.TOO_MANY_STEPS.value in info["event"]
     np.testing.assert_array_equal(observation, before)

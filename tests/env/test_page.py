@@ -35,8 +35,8 @@ def test_it_has_the_sections_of_the_template():
 def test_actions(table, mode, drive):
     env, rows = ElbowLiftEnv(action_mode=mode), _tables("Action Space")[table]
     assert [row[1] for row in rows] == list(drive.names)
-    low = drive.held(np.array([-1.0, -1.0]), np.zeros(2), 1e3)
-    high = drive.held(np.array([1.0, 1.0]), np.zeros(2), 1e3)
+    offset, gain, _ = drive.table(0.02).T
+    low, high = offset - gain, offset + gain
     for k, (_, _, least, most, control_least, control_most, _) in enumerate(rows):
         assert (env.action_space.low[k], env.action_space.high[k]) == (float(least), float(most))
         assert (low[k], high[k]) == (float(control_least), float(control_most))

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from dms_core.errors import InputError
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.effort import SIGN, STATE, Effort, reset_effort, samples, state_size, step_effort
+from exo_env.effort import SIGN, STATE, Effort, reset_effort, samples_in, state_size, step_effort
 from exo_env.fatigue import REST, L, advance_fatigue
 from exo_env.human import EXTENSORS, FLEXORS, MUSCLES
 from exo_env.patient import LONGEST_DELAY, Patient
@@ -66,14 +66,23 @@ def test_whole_delays_are_exact(delay, periods):
     np.testing.assert_allclose(found, np.maximum(late, MINIMUM), rtol=0.0, atol=1e-14)
 
 
-def test_delay_between_two_periods_is_the_mean_of_the_delayed_signal():
-    fine, per = 0.001, round(PERIOD / 0.001)
+def test_signals_are_linear_between_two_periods():
     command = MINIMUM + 0.9 * RAMP
     found = _course(_effort(electromechanical_delay=0.033), command)
-    held = np.repeat(command, per, axis=0)
-    late = np.vstack([np.repeat(held[:1], round(0.033 / fine), axis=0), held])[: len(held)]
-    # Both are sums of 20 numbers below 1.
-    np.testing.assert_allclose(found, late.reshape(len(command), per, 6).mean(axis=1), rtol=0.0, atol=1e-13)
+    times = PERIOD * np.arange(len(command))
+    late = np.stack([np.interp(times - 0.033, times, column) for column in command.T], axis=1)
+    # 0.033 / 0.02 is rounded.
+    np.testing.assert_allclose(found, late, rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.02, 0.03, 0.05])
+def test_what_is_felt_at_a_period_s_beginning_acts_at_its_end(delay):
+    """An error that rises in proportion to time: felt, it is late by its delay, and by a period at least."""
+    times = PERIOD * np.arange(40)
+    command = np.full((40, 6), 0.3)
+    found = _course(_effort(feedback_gain=0.5, feedback_delay=delay), command, error=times)
+    felt = np.maximum(times + PERIOD - max(delay, PERIOD), 0.0)
+    np.testing.assert_allclose(found[5:, FLEXES], 0.3 + 0.5 * felt[5:, None] * np.ones(3), rtol=1e-13)
 
 
 def test_delays_add_up_and_the_longest_fits():
@@ -99,9 +108,10 @@ def test_feedback_helps_where_the_arm_hangs_back():
     found = _course(
         _effort(feedback_gain=0.5, feedback_delay=0.04, maximum_activation_flexors=0.5), command, error=error
     )
-    assert np.all(found[:2, FLEXES] == 0.3) and np.all(found[:2, EXTENDS] == 0.3)
-    np.testing.assert_allclose(found[2:, FLEXES], 0.3 + 0.5 * 0.2, rtol=1e-14)
-    np.testing.assert_allclose(found[2:, EXTENDS], 0.3 - 0.5 * 0.2, rtol=1e-14)
+    # Felt at 0 s, it acts 0.04 s later: at the end of the second period.
+    assert np.all(found[:1, FLEXES] == 0.3) and np.all(found[:1, EXTENDS] == 0.3)
+    np.testing.assert_allclose(found[1:, FLEXES], 0.3 + 0.5 * 0.2, rtol=1e-14)
+    np.testing.assert_allclose(found[1:, EXTENDS], 0.3 - 0.5 * 0.2, rtol=1e-14)
     quiet = Effort(Patient(feedback_gain=0.5), PERIOD, np.random.default_rng(0), feedback=False)
     np.testing.assert_array_equal(_course(quiet, command, error=error), command)
 
@@ -111,8 +121,8 @@ def test_stretch_reflex_of_the_stretched_group_only(rate):
     fields = {"spasticity_flexors": 0.3, "spasticity_extensors": 0.1, "stretch_threshold": 0.5, "stretch_delay": 0.04}
     found = _course(_effort(**fields), np.full((10, 6), 0.05), rate=np.full(10, rate))
     stretched, gain = (FLEXES, 0.3) if rate < 0 else (EXTENDS, 0.1)
-    assert np.all(found[:2] == 0.05)
-    np.testing.assert_allclose(found[2:, stretched], 0.05 + gain * (2.0 - 0.5), rtol=1e-14)
+    assert np.all(found[:1] == 0.05)
+    np.testing.assert_allclose(found[1:, stretched], 0.05 + gain * (2.0 - 0.5), rtol=1e-14)
     assert np.all(found[:, ~stretched] == 0.05)
 
 
@@ -139,9 +149,9 @@ def test_tremor_is_a_sine_in_opposite_phase():
     n, f = 500, 4.0
     effort = _effort(tremor_amplitude=0.05, tremor_frequency=f)
     found = _course(effort, np.full((n, 6), 0.4)) - 0.4
-    # After 40 whole cycles the phase is that of the start; the value held is that of the middle of the period.
+    # After 40 whole cycles the phase is that of the start; the value is that of the end of the period.
     start = effort.state[STATE.phase]
-    assert found[0, 3] == pytest.approx(0.05 * np.sin(start + np.pi * f * PERIOD), abs=1e-12)
+    assert found[0, 3] == pytest.approx(0.05 * np.sin(start + 2.0 * np.pi * f * PERIOD), abs=1e-12)
     np.testing.assert_allclose(found[:, 3], -found[:, 0], rtol=0.0, atol=1e-14)
     spectrum = np.abs(np.fft.rfft(found[:, 3])) * 2.0 / n
     peak = round(f * n * PERIOD)
@@ -273,8 +283,8 @@ def test_half_the_period_gives_the_same_patient():
     signals = {"error": np.full(100, 0.02), "rate": np.full(100, 1.0)}
     a = _course(coarse, command, **signals)
     b = _course(fine, np.repeat(command, 2, axis=0), **{k: np.repeat(v, 2) for k, v in signals.items()})
-    # Effort and compartments are integrated exactly or to 1e-5; effort is held over half the period: 0.3 % of it lower.
-    np.testing.assert_allclose(b[::2], a, rtol=0.0, atol=2e-3)
+    # Effort is integrated exactly; what is fatigued is that of a period's beginning: 0.02 / s in 0.01 s.
+    np.testing.assert_allclose(b[1::2], a, rtol=0.0, atol=2e-4)
     assert coarse.effort == pytest.approx(fine.effort, rel=1e-12)
 
 
@@ -315,7 +325,7 @@ def test_reset_gives_the_excitations_of_a_long_held_command():
 
 def test_rows_of_a_batch_are_the_single_patients():
     patients = [Patient(**IMPAIRED), Patient(neural_delay=0.1), Patient(tremor_amplitude=0.1, co_contraction=0.4)]
-    n = samples(PERIOD)
+    n = samples_in(PERIOD)
     par, state = np.array([p.numbers() for p in patients]), np.full((3, state_size(PERIOD)), np.nan)
     out = np.empty((3, 6))
     generators = [np.random.default_rng(9) for _ in patients]

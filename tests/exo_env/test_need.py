@@ -88,9 +88,10 @@ def test_environment_tells_the_ability_and_holds_the_need_at_its_control_times()
     need = env.episode.need
     assert info["ability"] == need.ability == ability(Patient(**weak), known(Patient(**weak), 1.5))
     assert need.lacking.shape == env.episode.times.shape
-    _, _, _, _, after = env.step(np.array([0.6, -1.0]))
+    for _ in range(4):
+        *_, after = env.step(np.array([0.6, -1.0]))
     moment = env.readings()["exo_moment"]
-    wanted = -max(moment - need.lacking[1], -moment, 0.0) / need.scale
+    wanted = -max(moment - need.lacking[4], -moment, 0.0) / need.scale
     assert after["reward_terms"]["assistance"] == pytest.approx(wanted, rel=1e-12) and wanted < -0.05
 
 
