@@ -6,12 +6,17 @@ WORKERS ?= 2
 
 BIN := .venv/bin
 STAMP := .venv/installed
+# With the training libraries, which the tests need beside the rest; torch is large, the demo does without it.
+TRAIN_STAMP := .venv/installed-train
+# The lower bound in pyproject.toml.
+OLDEST_GYMNASIUM := 1.2.0
 
-.PHONY: help demo test bench lint format docs clean
+.PHONY: help demo test test-oldest bench lint format docs clean
 
 help:
 	@echo "make demo   the four scenarios of the paper, with figures, into $(OUT)"
 	@echo "make test   the tests"
+	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
 	@echo "make bench  speed, as a table"
 	@echo "make lint   ruff and mypy"
 	@echo "make format rewrite the sources in the project's layout"
@@ -26,12 +31,21 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[pictures,dev]"
 	@touch $@
 
+$(TRAIN_STAMP): $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[pictures,dev,train]"
+	@touch $@
+
 demo: $(STAMP)
 	$(BIN)/python -m exo_env scenarios --out $(OUT)
 	@echo "Figures, tables and scenarios.json are in $(abspath $(OUT))"
 
-test: $(STAMP)
+test: $(TRAIN_STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS)
+
+test-oldest: $(TRAIN_STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv/oldest \
+	    gymnasium==$(OLDEST_GYMNASIUM)
+	PYTHONPATH=$(CURDIR)/.venv/oldest $(BIN)/python -m pytest -n $(WORKERS) tests/env
 
 bench: $(STAMP)
 	$(BIN)/python tests/benchmarks/bench.py

@@ -224,7 +224,10 @@ def sweep(arm, interval, moment, lengths, levers, relaxation, tendon_force, acti
 
 @compiled
 def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, activations):
-    """Fill moment [Nm], shape (n,), and activations [-], shape (n, 6); gives the largest shortage [Nm].
+    """Fill moment [Nm], shape (n,), and activations [-], shape (n, 6).
+
+    Gives the largest shortage [Nm] and the largest change of an activation in the last iteration, at least `settled`
+    where the iteration did not end by itself.
 
     Args:
         arm: an ArmTable.
@@ -245,7 +248,7 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         for i in range(m):
             lengths[k, i], levers[k, i] = path_geometry(arm, i, course[k, 0])
             activations[k, i] = MINIMUM
-    shortage = 0.0
+    change, shortage = math.inf, 0.0
     for _ in range(sweeps):
         forces(arm, interval, lengths, tendon_force, activations, fibre, work[0], work[1])
         change, shortage = sweep(
@@ -253,4 +256,4 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         )
         if change < settled:
             break
-    return shortage
+    return shortage, change

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 from scipy.optimize import brentq
 
+from dms_core.errors import InputError
 from dms_core.model import GROUND, JointSpringDamper, PathPoint, Revolute, RigidBody, RopeLength, Slider
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.frames import quaternion, rotation_matrix
@@ -45,10 +46,29 @@ class LoadedMachine:
         machine: the machine.
         arm: whose hand holds the handle.
         mass: of the weight [kg].
+
+    Raises:
+        InputError: an end of the rope could reach a pulley; its length has a kink there, and nothing stops the weight.
     """
 
     def __init__(self, machine: GymMachine, arm: Arm, mass: float) -> None:
         self.machine, self.arm, self.mass = machine, arm, mass
+        reach, from_low = self._reach(), float(np.linalg.norm(arm.elbow - machine.low_pulley))
+        room = machine.high_pulley[1] - machine.weight_start
+        if room <= 2.0 * reach:
+            raise InputError(
+                f"high_pulley = {machine.high_pulley} is {room:.4g} m above weight_start = {machine.weight_start}; the "
+                f"weight can rise by {2.0 * reach:.4g} m, and the pulley must be higher."
+            )
+        if from_low <= reach:
+            raise InputError(
+                f"low_pulley = {machine.low_pulley} is {from_low:.4g} m from the elbow, and the handle reaches "
+                f"{reach:.4g} m; it must be out of reach."
+            )
+
+    def _reach(self) -> float:
+        """Largest distance of the rope's end from the elbow [m]; the end is in a disc of twice this width."""
+        return float(np.linalg.norm(self.arm.grip)) + self.machine.handle.length
 
     def rest_angle(self, flexion: float) -> float:
         """Angle of the handle about the elbow axis, from hanging straight down, at which it rests [rad].

@@ -26,7 +26,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from dms_core.errors import InputError
+from dms_core.errors import InputError, SimulationError
 from dms_core.model import Spline
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.command_kernel import ArmTable, LoadTable, needed_moment, path_geometry, planned
@@ -150,10 +150,19 @@ def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> 
         model: what the subject knows.
         times: evenly spaced [s], shape (n,).
         course: psi [rad], its rate [rad/s] and its acceleration [rad/s^2], shape (n, 3).
+
+    Raises:
+        SimulationError: the iteration between tendon strain and activation does not settle.
     """
     moment, activations = np.zeros(len(times)), np.zeros((len(times), len(MUSCLES)))
-    shortage = planned(
+    shortage, change = planned(
         model.arm_table(), model.load_table(), float(times[1] - times[0]), np.ascontiguousarray(course, dtype=float),
         SWEEPS, RELAXATION, SETTLED, moment, activations,
     )  # fmt: skip
+    if not change < SETTLED:
+        raise SimulationError(
+            f"the motor command does not settle: after {SWEEPS} iterations between tendon strain and activation an "
+            f"activation still changes by {change:.3g}; below {SETTLED:g} is wanted. Check the person's muscles and "
+            f"the movement of {times[-1]:.4g} s."
+        )
     return MotorCommand(times, activations, moment, shortage)

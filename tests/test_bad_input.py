@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 
 from dms_core import InputError, Model, ModelError, SolverOptions, System, simulate
 from dms_core.errors import AssemblyError
 from dms_core.model import (
+    AngleDriver,
     Distance,
     Fixed,
     Gravity,
+    Harmonic,
     Input,
     JointAngle,
     Lines,
@@ -211,6 +214,10 @@ class TestGeometry:
         with pytest.raises(AssemblyError, match="'joint' can be assembled only with 'rod' turned over by half a turn"):
             Model(System(bodies=[rod()], constraints=[turned]))
 
+    def test_a_hinge_whose_axes_are_opposite(self):
+        with pytest.raises(AssemblyError, match="revolute 'hinge' .* only with 'rod' turned over .*, or reverse the"):
+            Model(System(bodies=[rod()], constraints=[hinge(axis_j=(0.0, 0.0, -1.0))]))
+
     def test_a_pointer_along_the_axis(self):
         """Bodies that know the axis by other names: body_i's pointer (0, 1, 0) is the axis of body_j."""
         joint = hinge(axis_i=(0.0, 0.0, 1.0), axis_j=(0.0, 1.0, 0.0))
@@ -219,6 +226,20 @@ class TestGeometry:
         with pytest.raises(ModelError, match=r"joint_angle 's': pointer_j = .* lies along the axis of 'hinge'"):
             Model(System(**parts, sensors=[JointAngle(name="s", joint="hinge")]))
         Model(System(**parts, sensors=[JointAngle(name="s", joint="hinge", pointer_j=(1.0, 0.0, 0.0))]))
+
+    def test_velocities_that_contradict_a_joint_beside_a_driven_mechanism(self):
+        """What the driver moves may start with any guess; the other mechanism must fit."""
+        driven = rod("driven", position=(0.0, 2.0, 0.0), angular_velocity=(0.0, 0.0, 1.0))
+        other = PointMass(name="bob", mass=1.0, position=(1.0, 0.0, 0.0), velocity=(0.5, 1.0, 0.0))
+        joints = [Revolute(name="axle", body_j="driven", point_i=(0.0, 2.0, 0.0))]
+        joints += [AngleDriver(name="motor", joint="axle", input="turn"), Distance(name="string", body_j="bob")]
+        turn = Input(name="turn", signal=Harmonic(amplitude=1.0, frequency=3.0 / (2.0 * math.pi)))
+        parts = {"constraints": joints, "inputs": [turn]}
+        with pytest.raises(AssemblyError, match=r"'string.length' would open .* changes 'bob.x' from 0.5 to 0;"):
+            Model(System(bodies=[driven, other], **parts))
+        fitting = other.model_copy(update={"velocity": (0.0, 1.0, 0.0)})
+        start = Model(System(bodies=[driven, fitting], **parts)).start
+        assert np.abs(start.v).max() == pytest.approx(1.5), "half of 3 rad/s in the Euler parameters"
 
     def test_velocities_that_contradict_a_joint(self):
         system = System(bodies=[rod(velocity=(1.0, 0.0, 0.0))], constraints=[hinge()])

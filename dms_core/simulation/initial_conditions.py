@@ -12,6 +12,7 @@ from dms_core.assembly.residual import evaluate_inputs
 from dms_core.errors import AssemblyError
 from dms_core.linear.rank import independent_rows
 from dms_core.model.constraints.fixed import Fixed
+from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.constraints.slider import Slider
 from dms_core.model.rotations import rotated
 
@@ -51,7 +52,7 @@ def assemble(model: Model, known: Start | None = None) -> Start:
 
     Raises:
         AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint;
-            the latter is not looked for where a driver moves at the start.
+            the latter is not looked for in what a driver moves at the start.
     """
     q, v = (x[: model.n_q].copy() for x in model.layout.start())
     declared = q.copy()
@@ -91,17 +92,18 @@ def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
 
 
 def _check_turns(model: Model, q: np.ndarray) -> None:
-    """Perpendicular directions stay so in a body that is turned over: a weld or slider closed like that is an error."""
+    """Perpendicular directions stay so in a body that is turned over: a joint closed like that is an error."""
     whole = np.concatenate([q, GROUND_COORDINATES])
     for call in model.layout.constraints:
-        if not isinstance(call.element, Fixed | Slider):
+        if not isinstance(call.element, Fixed | Slider | Revolute):
             continue
         local = whole[call.iq]
         for a, b in zip(*call.element.aligned(call.placement.numbers), strict=True):
             if np.dot(rotated(local, 0, tuple(a)), rotated(local, 7, tuple(b))) < 0.0:
                 raise AssemblyError(
                     f"{call.element.kind} '{call.element.name}' can be assembled only with '{call.element.body_j}' "
-                    "turned over by half a turn; declare its start orientation nearer to that of the joint."
+                    "turned over by half a turn; declare its start orientation nearer to that of the joint, or reverse "
+                    "the direction that the joint has in it."
                 )
 
 
@@ -142,22 +144,34 @@ def _rows(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def _velocities(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Velocities on phi_q v + phi_t = 0.
 
-    A contradiction of declared ones is an error; where a driver moves they are a guess, and the nearest are taken.
+    A contradiction of declared ones is an error; in a mechanism that a driver moves they are a guess, and the nearest
+    are taken.
     """
     _, phi_v, G, _ = model.constraint_jacobian(q, v)
     _, phi_t, _, _ = model.constraint_jacobian(q, np.zeros_like(v))
     correction = np.linalg.lstsq(G, phi_v, rcond=1e-10)[0] if model.n_phi else np.zeros_like(v)
     size = np.abs(v).max(initial=0.0)
-    gap = np.abs(phi_v - phi_t)
-    if size > 0.0 and gap.max(initial=0.0) > VELOCITY_TOLERANCE * size and not np.any(phi_t):
+    driven = _driven(G, phi_t)
+    gap = np.where(driven, 0.0, np.abs(phi_v))
+    if size > 0.0 and gap.max(initial=0.0) > VELOCITY_TOLERANCE * size:
         row = int(np.argmax(gap))
-        worst = int(np.argmax(np.abs(correction)))
+        worst = int(np.argmax(np.abs(correction) * np.any(G[~driven] != 0.0, axis=0)))
         raise AssemblyError(
             f"the declared velocities are inconsistent: constraint '{model.layout.row_names[row]}' would open at "
             f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{model.layout.names[worst]}' "
             f"from {v[worst]:.6g} to {v[worst] - correction[worst]:.6g}; declare all velocities of that loop."
         )
     return v - correction
+
+
+def _driven(G: np.ndarray, phi_t: np.ndarray) -> np.ndarray:
+    """True for the rows of a mechanism, coordinates that constraints link, in which a driver moves; shape (m,)."""
+    touches, rows = G != 0.0, phi_t != 0.0
+    while True:
+        more = np.any(touches[:, np.any(touches[rows], axis=0)], axis=1) | rows
+        if np.array_equal(more, rows):
+            return rows
+        rows = more
 
 
 def _start_states(model: Model, q: np.ndarray, v: np.ndarray) -> None:

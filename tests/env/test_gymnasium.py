@@ -1,4 +1,4 @@
-"""The environment as Gymnasium wants it: checker, spec, seeds, pickles, vector environments, wrappers."""
+"""The environment as Gymnasium wants it: checker, spec, seeds, pickles, wrappers. Vectors: test_vector.py."""
 
 import json
 import pickle
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import RecordEpisodeStatistics
+from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo
 
 ID = "exo/ElbowLift-v0"
 ACTION = np.array([-0.4, -0.9], np.float32)
@@ -92,22 +92,6 @@ def test_a_pickled_environment_goes_on_with_its_generator(make):
     assert one == other and twin.observation_space == env.observation_space
 
 
-@pytest.mark.parametrize("vector", [gymnasium.vector.SyncVectorEnv, gymnasium.vector.AsyncVectorEnv])
-def test_vector_environments(make, vector):
-    envs = vector([lambda: gymnasium.make("exo_env:" + ID) for _ in range(2)])
-    try:
-        found, _ = envs.reset(seed=[4, 5])
-        alone = make()
-        np.testing.assert_array_equal(found[1], alone.reset(seed=5)[0])
-        for _ in range(3):
-            found, rewards, *_ = envs.step(np.stack([ACTION, ACTION]))
-            single, reward, *_ = alone.step(ACTION)
-        np.testing.assert_array_equal(found[1], single)
-        assert rewards[1] == reward
-    finally:
-        envs.close()
-
-
 def test_episode_statistics(make):
     env = RecordEpisodeStatistics(make(action_mode="pid_setpoint", episode_duration=0.2))
     env.reset(seed=0)
@@ -118,6 +102,27 @@ def test_episode_statistics(make):
         over = terminated or truncated
     assert info["episode"]["l"] == len(rewards) == 10
     assert info["episode"]["r"] == pytest.approx(sum(rewards))
+
+
+def test_a_video_is_recorded_without_a_display(make, monkeypatch, tmp_path):
+    """RecordVideo writes mp4 with moviepy, which brings its own encoder; the pictures need no screen."""
+    imageio = pytest.importorskip("imageio")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        inner = make(render_mode="rgb_array", episode_duration=0.2)
+        env = RecordVideo(inner, str(tmp_path / "videos"), episode_trigger=lambda _: True)
+        env.reset(seed=0)
+        while not env.step(np.zeros(2, np.float32))[3]:
+            pass
+        env.close()
+    (video,) = tmp_path.glob("videos/*.mp4")
+    with imageio.get_reader(video) as reader:
+        frames = [np.asarray(frame) for frame in reader]
+        assert reader.get_meta_data()["fps"] == 50.0
+    # The reset and ten periods; the encoder, which counts by duration, may drop the last.
+    assert len(frames) in (10, 11) and frames[0].shape == (480, 480, 3)
 
 
 def test_memory_is_not_shared(env):

@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import minimize
 
 from dms_core import simulate
-from dms_core.errors import InputError
+from dms_core.errors import InputError, SimulationError
+from exo_env import motor_command
 from exo_env.command_kernel import least_squares
 from exo_env.ecosystem import Ecosystem, Proprioception
 from exo_env.exoskeleton import Exoskeleton
@@ -41,6 +42,15 @@ def test_a_moment_out_of_reach_is_reported():
     left = least_squares(100.0, np.array([-16.0, -12.0, -11.0, 22.0, 14.0, 16.0]), found)
     np.testing.assert_allclose(found, [0.01] * 3 + [1.0] * 3)
     assert left == pytest.approx(52.0 - 0.01 * 39.0 - 100.0)
+
+
+def test_a_command_that_does_not_settle_is_an_error(monkeypatch):
+    """About 30 iterations are needed; three are too few."""
+    monkeypatch.setattr(motor_command, "SWEEPS", 3)
+    exercise, _ = load_scenarios()
+    model = InternalModel(Arm(), GymMachine.from_config("gym_machine/pulley.yaml"), 1.0)
+    with pytest.raises(SimulationError, match="does not settle: after 3 iterations .* still changes by 0"):
+        plan(model, exercise.course, exercise.duration)
 
 
 @pytest.mark.parametrize("time", [0.2, 2.75, 5.3])

@@ -42,6 +42,10 @@ class Revolute(Constraint):
         """Coincidence in ground axes, then the two components of tilt."""
         return ("x", "y", "z", "tilt_f", "tilt_g")
 
+    def aligned(self, numbers) -> tuple[np.ndarray, np.ndarray]:
+        """Axis of body_i and that of body_j, which coincide, as rows, shapes (1, 3)."""
+        return np.cross(numbers[6:9], numbers[9:12])[None], np.reshape(numbers[12:15], (1, 3))
+
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
         axis_i = unit(self.axis_i, f"revolute '{self.name}': axis_i")

@@ -1,0 +1,89 @@
+"""An outside project (curls/) uses the built wheel, without the checkout and without the optional packages."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dms_core.config_files import configs
+
+CHECKOUT = configs().parent
+BLOCKED = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "pygame", "matplotlib", "imageio", "moviepy")
+
+BLOCK = f"""
+import sys
+
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {BLOCKED!r}:
+            raise ImportError(f"{{name}} is not to be imported here")
+
+sys.meta_path.insert(0, Block())
+"""
+
+
+def _lend_machine_code(site: Path) -> None:
+    """Put what numba compiled for the checkout beside the same sources in `site`, so that a minute is saved.
+
+    numba takes compiled code for that of a source file of the same time and size; the times are made equal only where
+    the bytes are. Without compiled code in the checkout the installed copy compiles its own.
+    """
+    for package in ("dms_core", "exo_env"):
+        for source in (CHECKOUT / package).rglob("*.py"):
+            installed = site / source.relative_to(CHECKOUT)
+            assert installed.read_bytes() == source.read_bytes()
+            stat = source.stat()
+            os.utime(installed, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+        kept = [p for end in ("nbi", "nbc", "sha256") for p in (CHECKOUT / package).rglob(f"__pycache__/*.{end}")]
+        for code in kept:
+            to = site / code.relative_to(CHECKOUT)
+            to.parent.mkdir(exist_ok=True)
+            shutil.copyfile(code, to)
+
+
+@pytest.fixture(scope="module")
+def run(installed, tmp_path_factory):
+    """Function that runs the installed interpreter in a folder with nothing but the project."""
+    python, site = installed
+    _lend_machine_code(site)
+    folder = tmp_path_factory.mktemp("project")
+    shutil.copytree(Path(__file__).with_name("curls"), folder / "curls", ignore=shutil.ignore_patterns("__pycache__"))
+    # Python imports sitecustomize before anything else, in the processes of a vector environment too.
+    (folder / "sitecustomize.py").write_text(BLOCK)
+    env = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")} | {"PYTHONPATH": str(folder)}
+
+    def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([python, *arguments], cwd=folder, env=env, capture_output=True, text=True, check=False)
+
+    return call
+
+
+def test_the_project_trains_on_its_own_task(run, installed):
+    done = run("-m", "curls")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert Path(found["file"]).is_relative_to(installed[1])
+    assert str(CHECKOUT) not in found["path"]
+    # What the project set is what it got.
+    assert 2.5 <= found["load"] <= 3.0 and 0.4 <= found["strength"] <= 0.5 and found["weight_of_tracking"] == 2.0
+    # 50 steps at a weight of 2; weak arms under 3 kg lag behind without help.
+    assert 100.0 > found["returns"]["full"] > found["returns"]["none"] + 5.0
+    assert np.isfinite(found["returns"]["none"])
+
+
+@pytest.mark.parametrize("package", ["torch", "stable_baselines3", "pygame", "matplotlib"])
+def test_the_block_works(run, package):
+    done = run("-c", f"import {package}")
+    assert done.returncode == 1 and "is not to be imported here" in done.stderr
+
+
+def test_rendering_without_pygame_says_what_to_install(run):
+    code = "import gymnasium; env = gymnasium.make('curls:curls/HeavyCurl-v0', render_mode='rgb_array'); env.reset()"
+    done = run("-c", code + "; env.render()")
+    assert done.returncode == 1 and "exo-env[pictures]" in done.stderr.splitlines()[-1]
