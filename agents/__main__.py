@@ -2,6 +2,7 @@
 
 python -m agents evaluate --policy NAME [NAME ...] --population NAME --patients N --seed S --out DIR
 python -m agents policies
+python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR] | --resume DIR
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from typing import Annotated, Any
 from tqdm import tqdm
 from tyro.conf import arg
 
-from agents.baselines import POLICIES, policy
+from agents.baselines import POLICIES
 from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
 from agents.figure import draw, require_matplotlib
+from agents.learned import find_policy
+from agents.train_command import train
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, write_json
@@ -34,7 +37,7 @@ def evaluate(
     """Run policies on the same patients: a table, evaluation.json and evaluation.png.
 
     Args:
-        policy_names: one or more, see `python -m agents policies`.
+        policy_names: one or more, see `python -m agents policies`, or folders of trained ones.
         out: folder for the results; made where it is missing.
         population: of the patients, by name or YAML file.
         patients: how many; one episode each.
@@ -42,7 +45,7 @@ def evaluate(
     """
     if len(set(policy_names)) < max(len(policy_names), 1):
         raise InputError(f"--policy {' '.join(policy_names)}: one or more different names are wanted.")
-    used = [policy(name) for name in policy_names]
+    used = [find_policy(name) for name in policy_names]
     find_population(population)
     require_matplotlib()
     check_writable(out / "evaluation.json")
@@ -80,7 +83,7 @@ def _json(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"evaluate": evaluate, "policies": policies},
+        {"evaluate": evaluate, "policies": policies, "train": train},
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",
         arguments,
