@@ -3,6 +3,7 @@
 python -m agents evaluate --policy NAME [NAME ...] --population NAME --patients N --seed S --out DIR
 python -m agents policies
 python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR] | --resume DIR
+python -m agents export RUN --out DIR
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from tyro.conf import arg
 from agents.baselines import POLICIES
 from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
+from agents.export import export
 from agents.figure import draw, require_matplotlib
 from agents.learned import find_policy
 from agents.train_command import train
@@ -83,7 +85,7 @@ def _json(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"evaluate": evaluate, "policies": policies, "train": train},
+        {"evaluate": evaluate, "policies": policies, "train": train, "export": export},
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",
         arguments,

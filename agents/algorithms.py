@@ -86,7 +86,7 @@ def activation(name: str) -> type[nn.Module]:
     """
     key = str(name).rpartition(".")[2].lower().replace("_", "")
     if key not in ACTIVATIONS:
-        raise InputError(f"policy_kwargs: activation_fn = {name!r}; one of {choices(ACTIVATIONS)} is wanted.")
+        raise InputError(f"policy_kwargs: activation_fn = '{name}'; one of {choices(ACTIVATIONS)} is wanted.")
     return ACTIVATIONS[key]
 
 

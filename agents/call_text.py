@@ -40,7 +40,7 @@ def read_call(text: str) -> dict[str, Any]:
 
 def write_call(values: Mapping[str, Any]) -> str:
     """The text of a mapping with names as keys."""
-    return f"dict({', '.join(f'{key}={_plain(value)!r}' for key, value in values.items())})"
+    return f"dict({', '.join(f'{key}={plain(value)!r}' for key, value in values.items())})"
 
 
 def _value(node: ast.expr) -> Any:
@@ -72,10 +72,10 @@ def _dotted(node: ast.expr) -> str:
     raise ValueError(f"'{ast.unparse(node)}' is not a plain name")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Plain dicts and lists, whose text Python reads; file sections are not."""
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, list):
-        return [_plain(v) for v in value]
+        return [plain(v) for v in value]
     return value

@@ -15,7 +15,7 @@ from typing import Any, Self
 import gymnasium
 from pydantic import Field
 
-from agents.call_text import read_call, write_call
+from agents.call_text import plain, read_call, write_call
 from agents.evaluate import ENVIRONMENT
 from dms_core.errors import InputError, choices
 from dms_core.yaml_text import read_value, read_yaml
@@ -104,7 +104,7 @@ class Config:
 
     def content(self) -> dict[str, Any]:
         """What a file of this configuration holds; rl_zoo3 reads it too."""
-        section = {k: write_call(v) if k == "policy_kwargs" else v for k, v in self.section.items()}
+        section = {k: write_call(v) if k == "policy_kwargs" else plain(v) for k, v in self.section.items()}
         return {ENVIRONMENT_ID: section, TRAINING: self.training.model_dump()}
 
 

@@ -77,7 +77,7 @@ class RunFolder:
     def write_config(self, config: Config) -> None:
         """Keep the configuration."""
         with whole_file(self.path / CONFIG) as file:
-            yaml.safe_dump(json.loads(json.dumps(config.content())), file, sort_keys=False, width=120)
+            yaml.safe_dump(config.content(), file, sort_keys=False, width=120)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

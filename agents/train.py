@@ -72,7 +72,7 @@ class TrainingRun:
         """Train to the end, or until told to stop; returns whether it came to the end.
 
         Raises:
-            DmsError: the disk is full, or the networks are no longer finite; the last checkpoint is whole.
+            DmsError: the disk is full, or the networks diverge; the last checkpoint is whole.
         """
         left = self.config.n_timesteps - self.steps
         self._began = time.perf_counter() - self.seconds
@@ -89,9 +89,9 @@ class TrainingRun:
                 f"'{self.folder.path}' cannot be written: {error.strerror or error}. {self._advice()}"
             ) from None
         except ValueError as error:
-            if isinstance(error, DmsError) or _finite(self.model):
+            if isinstance(error, DmsError) or not _diverged(self.model, error):
                 raise
-            raise DmsError(f"after {self.steps} steps the networks are no longer finite. {self._advice()}") from None
+            raise DmsError(f"after {self.steps} steps the networks have diverged. {self._advice()}") from None
         finally:
             self.env.close()
             self.model.get_env().close()  # type: ignore[union-attr]
@@ -232,5 +232,7 @@ def _mean(values: list[Any]) -> float | None:
     return float(np.mean(kept)) if kept else None
 
 
-def _finite(model: BaseAlgorithm) -> bool:
-    return all(bool(torch.isfinite(p).all()) for p in model.policy.parameters())
+def _diverged(model: BaseAlgorithm, error: ValueError) -> bool:
+    """Whether it is the numbers that an error comes from: PyTorch's distributions refuse what is not finite."""
+    finite = all(bool(torch.isfinite(p).all()) for p in model.policy.parameters())
+    return not finite or str(error).startswith("Expected parameter")

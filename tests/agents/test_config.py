@@ -137,7 +137,9 @@ def test_mistakes_of_overrides_are_named(said, override):
 def test_another_environment_is_refused(tmp_path):
     path = tmp_path / "ppo.yml"
     path.write_text("exo/ElbowLift-v7: {n_timesteps: 10}\n")
-    with pytest.raises(InputError, match="ppo.yml: the configuration is for exo/ElbowLift-v7; here there is exo/ElbowL"):
+    with pytest.raises(
+        InputError, match="ppo.yml: the configuration is for exo/ElbowLift-v7; here there is exo/ElbowL"
+    ):
         Config.read(path)
 
 
