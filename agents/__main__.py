@@ -4,6 +4,7 @@ python -m agents evaluate --policy NAME [NAME ...] --population NAME --patients 
 python -m agents policies
 python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR] | --resume DIR
 python -m agents export RUN --out DIR
+python -m agents report RUN [RUN ...] --out DIR
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from agents.evaluate import table
 from agents.export import export
 from agents.figure import draw, require_matplotlib
 from agents.learned import find_policy
+from agents.report import report
 from agents.train_command import train
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
@@ -85,7 +87,7 @@ def _json(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"evaluate": evaluate, "policies": policies, "train": train, "export": export},
+        {"evaluate": evaluate, "policies": policies, "train": train, "export": export, "report": report},
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",
         arguments,

@@ -106,15 +106,21 @@ def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, fl
 
 def table(results: dict[str, Any]) -> str:
     """What is printed: a row a measure, a column a policy, interval in brackets."""
+    rows = table_rows(results)
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
+             for row in rows]  # fmt: skip
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def table_rows(results: dict[str, Any]) -> list[list[str]]:
+    """Cells of the table, the first row its head."""
     names = list(results["policies"])
     rows = [["", *names]]
     for m in MEASURES:
         label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
         rows.append([label, *(_cell(Estimate(**results["policies"][n]["summary"][m.name])) for n in names)])
-    widths = [max(len(row[k]) for row in rows) for k in range(len(names) + 1)]
-    lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
-             for row in rows]  # fmt: skip
-    return "\n".join(line.rstrip() for line in lines)
+    return rows
 
 
 def _cell(e: Estimate) -> str:
