@@ -5,6 +5,7 @@ python -m agents policies
 python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR] | --resume DIR
 python -m agents export RUN --out DIR
 python -m agents report RUN [RUN ...] --out DIR
+python -m agents sweep --configs FILE [FILE ...] --seeds S [S ...] --out DIR
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from tqdm import tqdm
 from tyro.conf import arg
@@ -24,6 +25,7 @@ from agents.export import export
 from agents.figure import draw, require_matplotlib
 from agents.learned import find_policy
 from agents.report import report
+from agents.sweep import sweep
 from agents.train_command import train
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
@@ -37,6 +39,8 @@ def evaluate(
     population: str = "evaluation",
     patients: int = 20,
     seed: int = 0,
+    workers: Literal["here", "ray"] = "here",
+    address: str | None = None,
 ) -> int:
     """Run policies on the same patients: a table, evaluation.json and evaluation.png.
 
@@ -46,6 +50,8 @@ def evaluate(
         population: of the patients, by name or YAML file.
         patients: how many; one episode each.
         seed: of the patients and of the bootstrap.
+        workers: 'ray' shares the episodes out, with the same results to the last bit.
+        address: of a Ray cluster; a local one is started where it is not given.
     """
     if len(set(policy_names)) < max(len(policy_names), 1):
         raise InputError(f"--policy {' '.join(policy_names)}: one or more different names are wanted.")
@@ -59,7 +65,12 @@ def evaluate(
             bar.set_description(name)
             bar.update()
 
-        results = run_all(used, population, patients, seed, progress=progress)
+        if workers == "ray":
+            from agents.shared_evaluation import evaluate_by_ray
+
+            results = evaluate_by_ray(used, population, patients, seed, address=address, progress=progress)
+        else:
+            results = run_all(used, population, patients, seed, progress=progress)
     write_json(out / "evaluation.json", _json(results))
     draw(out / "evaluation.png", results)
     print(f"{patients} patients of '{population}', seed {seed}: interquartile mean [95 % bootstrap interval]")
@@ -87,7 +98,14 @@ def _json(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"evaluate": evaluate, "policies": policies, "train": train, "export": export, "report": report},
+        {
+            "evaluate": evaluate,
+            "policies": policies,
+            "train": train,
+            "export": export,
+            "report": report,
+            "sweep": sweep,
+        },
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",
         arguments,

@@ -49,25 +49,54 @@ def evaluate(
     Raises:
         InputError: the population is unknown, or a number is not usable.
     """
+    check_numbers(patients, seed)
+    source, seeds = population(patients_of), patient_seeds(seed, patients)
+    episodes = [episodes_of(one, source.model_dump(), seeds, settings, progress) for one in policies]
+    return results_of(policies, episodes, source.title, patients, seed)
+
+
+def check_numbers(patients: int, seed: int) -> None:
+    """Refuses numbers that are too small.
+
+    Raises:
+        InputError: names the number.
+    """
     for name, value, least in (("patients", patients, 1), ("seed", seed, 0)):
         if value < least:
             raise InputError(f"{name} = {value}; a whole number from {least} is wanted.")
-    source, seeds = population(patients_of), patient_seeds(seed, patients)
-    found: dict[str, Any] = {}
-    for one in policies:
-        env = gymnasium.make(
-            ENVIRONMENT, disable_env_checker=True, patient=source.model_dump(), action_mode=one.action_mode,
-            observation=list(one.observation), **settings,
-        )  # fmt: skip
-        episodes = []
-        for number in seeds:
-            episodes.append({"seed": number, **episode(env, one, number)})
-            if progress is not None:
-                progress(one.name)
-        env.close()
-        found[one.name] = {"title": one.title, "summary": summary(episodes, seed), "episodes": episodes}
+
+
+def episodes_of(
+    one: Policy,
+    patient: dict[str, Any],
+    seeds: Sequence[int],
+    settings: dict[str, Any],
+    progress: Callable[[str], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Episodes of a policy, one a seed."""
+    env = gymnasium.make(
+        ENVIRONMENT, disable_env_checker=True, patient=patient, action_mode=one.action_mode,
+        observation=list(one.observation), **settings,
+    )  # fmt: skip
+    found = []
+    for number in seeds:
+        found.append({"seed": number, **episode(env, one, number)})
+        if progress is not None:
+            progress(one.name)
+    env.close()
+    return found
+
+
+def results_of(
+    policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], title: str, patients: int, seed: int
+) -> dict[str, Any]:
+    """What `evaluate` returns, from the episodes of each policy."""
+    found = {
+        one.name: {"title": one.title, "summary": summary(those, seed), "episodes": those}
+        for one, those in zip(policies, episodes, strict=True)
+    }
     return {
-        "population": source.title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
+        "population": title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
         "confidence": CONFIDENCE, "resamples": RESAMPLES, "policies": found,
     }  # fmt: skip
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shlex
 import sys
 from collections.abc import Iterator
@@ -47,7 +48,8 @@ class RunFolder:
         Raises:
             InputError: the folder is in use.
         """
-        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+        # A start that was killed before its record was written leaves no more than these.
+        if self.path.exists() and (not self.path.is_dir() or {p.name for p in self.path.iterdir()} - {CONFIG, LOCK}):
             hint = f"go on with --resume {self.path}, or" if (self.path / RECORD).is_file() else ""
             raise InputError(f"output '{self.path}' is not empty; {hint} choose another --out.".replace("  ", " "))
         check_writable(self.path / RECORD)
@@ -91,11 +93,14 @@ class RunFolder:
         except ImportError:  # Windows; two trainings in one folder go unnoticed there.
             yield
             return
-        with (self.path / LOCK).open("w") as file:
+        with (self.path / LOCK).open("a+") as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise InputError(f"another process is training in '{self.path}'.") from None
+            file.truncate(0)
+            file.write(f"{os.getpid()}\n")
+            file.flush()
             yield
 
 
