@@ -6,6 +6,7 @@ python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR
 python -m agents export RUN --out DIR
 python -m agents report RUN [RUN ...] --out DIR
 python -m agents sweep --configs FILE [FILE ...] --seeds S [S ...] --out DIR
+python -m agents video --policy A B --patient NAME --out FILE.mp4
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from agents.learned import find_policy
 from agents.report import report
 from agents.sweep import sweep
 from agents.train_command import train
+from agents.video import video
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, write_json
@@ -105,6 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
             "export": export,
             "report": report,
             "sweep": sweep,
+            "video": video,
         },
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",

@@ -233,6 +233,36 @@ def test_mistakes_are_one_message(said, arguments, tmp_path, capsys, monkeypatch
     assert said in errors and errors.startswith("error: ") and errors.count("\n") == 1
 
 
+def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    assert train("--config", config_file(tmp_path)) == 2
+    assert "training needs sb3_contrib; install it with: pip install 'exo-env[train]'" in capsys.readouterr().err
+
+
+def test_a_start_killed_before_its_record_is_begun_again(tmp_path):
+    path, out = config_file(tmp_path), tmp_path / "run"
+    out.mkdir()
+    (out / "config.yml").write_text("half a f")
+    assert train("--config", path, "--out", out, "--set", "n_timesteps=32") == 0
+
+
+def test_an_unfinished_checkpoint_is_never_taken(tmp_path):
+    from agents.checkpoint import Store
+
+    def fail(part):
+        (part / "half").write_text("x")
+        raise OSError(28, "No space left on device")
+
+    store = Store(tmp_path / "checkpoints")
+    first = store.save("a", lambda part: (part / "whole").write_text("1"))
+    with pytest.raises(OSError, match="No space left"):
+        store.save("b", fail)
+    assert store.latest() == first and [p.name for p in store.folder.iterdir() if p.is_dir()] == ["a"]
+    # A run that goes on from an older checkpoint comes by the same name again; the old one is whole until then.
+    again = store.save("a", lambda part: (part / "whole").write_text("2"))
+    assert store.latest() == again and (again / "whole").read_text() == "2"
+
+
 def test_a_folder_in_use_is_refused(tmp_path, capsys):
     path, out = config_file(tmp_path), tmp_path / "run"
     assert train("--config", path, "--out", out, "--set", "n_timesteps=32") == 0
