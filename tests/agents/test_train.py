@@ -115,7 +115,7 @@ def process(*arguments, **options):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
-def wait_for(condition, running, seconds=120.0):
+def wait_for(condition, running, seconds=300.0):
     end = time.monotonic() + seconds
     while not condition():
         assert running.poll() is None, running.communicate()
@@ -150,7 +150,7 @@ def test_told_to_stop_it_saves_and_says_how_to_go_on(number, tmp_path):
     wait_for((out / "evaluations.json").exists, running)
     time.sleep(0.5)
     running.send_signal(number)
-    said, errors = running.communicate(timeout=60)
+    said, errors = running.communicate(timeout=300)
     assert running.returncode == 130 and errors == ""
     assert said.splitlines()[-1].endswith(f"go on with: python -m agents train --resume {out}")
     assert not RunFolder(out).checkpoints.empty
@@ -165,7 +165,7 @@ def test_full_disk_leaves_the_last_checkpoint(tmp_path):
     # No file may be longer than 4 kB: the model is.
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))  # noqa: E731
     running = process("--resume", out, "--set", "n_timesteps=128", preexec_fn=limit)
-    _, errors = running.communicate(timeout=120)
+    _, errors = running.communicate(timeout=300)
     assert running.returncode == 2
     assert errors.startswith("error: ") and errors.count("\n") == 1
     assert "File too large" in errors and f"go on with --resume {out}" in errors
