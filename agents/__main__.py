@@ -3,6 +3,11 @@
 python -m agents evaluate --policy NAME [NAME ...] --population NAME --patients N --seed S --out DIR
 python -m agents policies
 python -m agents tune-baselines [--tries N] [--patients N] [--workers N] [--out DIR]
+python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR] | --resume DIR
+python -m agents export RUN --out DIR
+python -m agents report RUN [RUN ...] --out DIR
+python -m agents sweep --configs FILE [FILE ...] --seeds S [S ...] --out DIR
+python -m agents video --policy A B --patient NAME --out FILE.mp4
 """
 
 from __future__ import annotations
@@ -10,16 +15,22 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from tqdm import tqdm
 from tyro.conf import arg
 
-from agents.baselines import POLICIES, policy
+from agents.baselines import POLICIES
 from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
+from agents.export import export
 from agents.figure import draw, require_matplotlib
+from agents.learned import find_policy
+from agents.report import report
+from agents.sweep import sweep
+from agents.train_command import train
 from agents.tune_command import tune_baselines
+from agents.video import video
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, write_json
@@ -32,19 +43,23 @@ def evaluate(
     population: str = "evaluation",
     patients: int = 20,
     seed: int = 0,
+    workers: Literal["here", "ray"] = "here",
+    address: str | None = None,
 ) -> int:
     """Run policies on the same patients: a table, evaluation.json and evaluation.png.
 
     Args:
-        policy_names: one or more, see `python -m agents policies`.
+        policy_names: one or more, see `python -m agents policies`, or folders of trained ones.
         out: folder for the results; made where it is missing.
         population: of the patients, by name or YAML file.
         patients: how many; one episode each.
         seed: of the patients and of the bootstrap.
+        workers: 'ray' shares the episodes out, with the same results to the last bit.
+        address: of a Ray cluster; a local one is started where it is not given.
     """
     if len(set(policy_names)) < max(len(policy_names), 1):
         raise InputError(f"--policy {' '.join(policy_names)}: one or more different names are wanted.")
-    used = [policy(name) for name in policy_names]
+    used = [find_policy(name) for name in policy_names]
     find_population(population)
     require_matplotlib()
     check_writable(out / "evaluation.json")
@@ -54,7 +69,12 @@ def evaluate(
             bar.set_description(name)
             bar.update()
 
-        results = run_all(used, population, patients, seed, progress=progress)
+        if workers == "ray":
+            from agents.shared_evaluation import evaluate_by_ray
+
+            results = evaluate_by_ray(used, population, patients, seed, address=address, progress=progress)
+        else:
+            results = run_all(used, population, patients, seed, progress=progress)
     write_json(out / "evaluation.json", _json(results))
     draw(out / "evaluation.png", results)
     print(f"{patients} patients of '{population}', seed {seed}: interquartile mean [95 % bootstrap interval]")
@@ -82,7 +102,16 @@ def _json(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"evaluate": evaluate, "policies": policies, "tune-baselines": tune_baselines},
+        {
+            "evaluate": evaluate,
+            "policies": policies,
+            "train": train,
+            "export": export,
+            "report": report,
+            "sweep": sweep,
+            "tune-baselines": tune_baselines,
+            "video": video,
+        },
         "python -m agents",
         "Policies for exo/ElbowLift-v0 and their evaluation.",
         arguments,

@@ -53,29 +53,57 @@ def evaluate(
     Raises:
         InputError: the population is unknown, or a number is not usable.
     """
+    check_numbers(patients, seed)
+    source, seeds = population(patients_of), patient_seeds(seed, patients)
+    episodes = [episodes_of(one, source.model_dump(), seeds, settings, progress) for one in policies]
+    return results_of(policies, episodes, source.title, patients, seed)
+
+
+def check_numbers(patients: int, seed: int) -> None:
+    """Refuses numbers that are too small.
+
+    Raises:
+        InputError: names the number.
+    """
     for name, value, least in (("patients", patients, 1), ("seed", seed, 0)):
         if value < least:
             raise InputError(f"{name} = {value}; a whole number from {least} is wanted.")
-    source, seeds = population(patients_of), patient_seeds(seed, patients)
-    found: dict[str, Any] = {}
-    for one in policies:
-        env = gymnasium.make(
-            ENVIRONMENT, disable_env_checker=True, patient=source.model_dump(), action_mode=one.action_mode,
-            observation=list(one.observation), **settings,
-        )  # fmt: skip
-        episodes = []
-        for number in seeds:
-            episodes.append({"seed": number, **episode(env, one, number)})
-            if progress is not None:
-                progress(one.name)
-        env.close()
-        able = [e for e in episodes if e["ability"] >= ABLE]
+
+
+def episodes_of(
+    one: Policy,
+    patient: dict[str, Any],
+    seeds: Sequence[int],
+    settings: dict[str, Any],
+    progress: Callable[[str], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Episodes of a policy, one a seed."""
+    env = gymnasium.make(
+        ENVIRONMENT, disable_env_checker=True, patient=patient, action_mode=one.action_mode,
+        observation=list(one.observation), **settings,
+    )  # fmt: skip
+    found = []
+    for number in seeds:
+        found.append({"seed": number, **episode(env, one, number)})
+        if progress is not None:
+            progress(one.name)
+    env.close()
+    return found
+
+
+def results_of(
+    policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], title: str, patients: int, seed: int
+) -> dict[str, Any]:
+    """What `evaluate` returns, from the episodes of each policy."""
+    found = {}
+    for one, those in zip(policies, episodes, strict=True):
+        able = [e for e in those if e["ability"] >= ABLE]
         found[one.name] = {
-            "title": one.title, "summary": summary(episodes, seed), "summary_able": summary(able, seed),
-            "episodes": episodes,
+            "title": one.title, "summary": summary(those, seed), "summary_able": summary(able, seed),
+            "episodes": those,
         }  # fmt: skip
     return {
-        "population": source.title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
+        "population": title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
         "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE, "policies": found,
     }  # fmt: skip
 
@@ -114,13 +142,8 @@ def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, fl
 
 def table(results: dict[str, Any]) -> str:
     """What is printed: a row a measure, a column a policy, interval in brackets; then some of who can do something."""
-    names = list(results["policies"])
-    able = results["policies"][names[0]]["episodes"]
-    count = sum(e["ability"] >= results["able"] for e in able)
-    rows = [["", *names], *_rows(results, "summary", [m.name for m in MEASURES])]
-    rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
-    rows += _rows(results, "summary_able", OF_THE_ABLE)
-    widths = [max(len(row[k]) for row in rows) for k in range(len(names) + 1)]
+    rows = table_rows(results)
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
              for row in rows]  # fmt: skip
     return "\n".join(line.rstrip() for line in lines)
@@ -134,6 +157,15 @@ def _rows(results: dict[str, Any], summary: str, measures: Sequence[str]) -> lis
             label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
             found.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in results["policies"].values())])
     return found
+
+
+def table_rows(results: dict[str, Any]) -> list[list[str]]:
+    """Cells of the table, the first row its head."""
+    names = list(results["policies"])
+    count = sum(e["ability"] >= results["able"] for e in results["policies"][names[0]]["episodes"])
+    rows = [["", *names], *_rows(results, "summary", [m.name for m in MEASURES])]
+    rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
+    return rows + _rows(results, "summary_able", OF_THE_ABLE)
 
 
 def _cell(e: Estimate) -> str:

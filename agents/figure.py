@@ -55,6 +55,11 @@ def draw(path: Path, results: dict[str, Any]) -> None:
     figure.suptitle(
         f"{results['population']}: {n} patients, interquartile mean and {percent:g} % interval", fontsize=10
     )
+    save(figure, path)
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a picture as PNG, whole or not at all."""
     check_writable(path)
     picture = io.BytesIO()
     figure.savefig(picture, format="png")

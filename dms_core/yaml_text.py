@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -75,6 +76,18 @@ def read_yaml(path: str | Path) -> Section:
         what = "nothing" if found is None else f"a {type(found).__name__}"
         raise InputError(f"file '{path}' holds {what}; a mapping of keys to values is wanted.")
     return found
+
+
+def read_value(text: str) -> Any:
+    """What a text stands for by the same rules: '1e-3' is a number, '[64, 64]' a list, 'lin_1e-3' text.
+
+    Raises:
+        InputError: the text is not YAML.
+    """
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise InputError(f"value {text!r} is not valid YAML: {getattr(error, 'problem', None) or error}.") from None
 
 
 def _sentence(path: Path, error: yaml.YAMLError) -> str:

@@ -1,0 +1,81 @@
+"""Values that rl_zoo3 writes as Python text, "dict(net_arch=[64], activation_fn=nn.Tanh)", read without running it.
+
+rl_zoo3 evaluates such text, so a file from elsewhere could do anything. Here only literals, `dict(...)` and dotted
+names are taken; a name stays a name, and who uses it has a list of the names it knows.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+from dms_core.errors import InputError
+
+
+class Name(str):
+    """A dotted name that stood without quotes."""
+
+    def __repr__(self) -> str:
+        """As it stood."""
+        return str(self)
+
+
+def read_call(text: str) -> dict[str, Any]:
+    """The mapping that `dict(...)` or `{...}` stands for.
+
+    Raises:
+        InputError: the text is something else; names the part.
+    """
+    try:
+        found = _value(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, ValueError) as error:
+        raise InputError(
+            f"{text!r} is not a mapping: {error}; dict(key=value, ...) with plain values is wanted."
+        ) from None
+    if not isinstance(found, dict):
+        raise InputError(f"{text!r} is a {type(found).__name__}; dict(key=value, ...) with plain values is wanted.")
+    return found
+
+
+def write_call(values: Mapping[str, Any]) -> str:
+    """The text of a mapping with names as keys."""
+    return f"dict({', '.join(f'{key}={plain(value)!r}' for key, value in values.items())})"
+
+
+def _value(node: ast.expr) -> Any:
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "dict" and not node.args:
+        if any(k.arg is None for k in node.keywords):
+            raise ValueError("'**' is not plain")
+        return {str(k.arg): _value(k.value) for k in node.keywords}
+    if isinstance(node, ast.Name | ast.Attribute):
+        return Name(_dotted(node))
+    if isinstance(node, ast.List | ast.Tuple):
+        found = [_value(e) for e in node.elts]
+        return found if isinstance(node, ast.List) else tuple(found)
+    if isinstance(node, ast.Dict):
+        return {_key(k): _value(v) for k, v in zip(node.keys, node.values, strict=True)}
+    return ast.literal_eval(node)
+
+
+def _key(node: ast.expr | None) -> str:
+    if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
+        raise ValueError("a key is not text")
+    return node.value
+
+
+def _dotted(node: ast.expr) -> str:
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        return f"{_dotted(node.value)}.{node.attr}"
+    raise ValueError(f"'{ast.unparse(node)}' is not a plain name")
+
+
+def plain(value: Any) -> Any:
+    """Plain dicts and lists, whose text Python reads; file sections are not."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [plain(v) for v in value]
+    return value

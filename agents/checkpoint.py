@@ -1,0 +1,122 @@
+"""Folders that appear whole or not at all, the newest of them named by a pointer.
+
+A checkpoint is written beside the others under a hidden name, with the hash of each file, and renamed when it is whole;
+only then does `latest` name it. Whatever happens in between, `latest` names a whole one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from dms_core.errors import InputError
+from dms_core.output_file import whole_file
+
+POINTER, HASHES = "latest", "hashes.json"
+BLOCK = 1 << 20
+"""Read at once [byte]."""
+
+
+class Store:
+    """Checkpoints of one kind.
+
+    Args:
+        folder: of the store; made with the first checkpoint.
+        keep: how many remain.
+    """
+
+    def __init__(self, folder: Path, keep: int = 1) -> None:
+        self.folder, self.keep = folder, keep
+
+    def save(self, name: str, write: Callable[[Path], None]) -> Path:
+        """A new checkpoint.
+
+        Args:
+            name: of its folder; later ones sort behind.
+            write: fills a folder.
+
+        Raises:
+            OSError: the disk is full or cannot be written. What was there before is still there.
+        """
+        while (self.folder / name).exists():
+            # A run that went on from an older checkpoint comes by this name again.
+            name += "_again"
+        part, path = self.folder / f".{name}.part", self.folder / name
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        try:
+            write(part)
+            (part / HASHES).write_text(json.dumps({f.name: digest(f) for f in sorted(part.iterdir())}, indent=2))
+            for file in part.iterdir():
+                _to_disk(file)
+            part.rename(path)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+        with whole_file(self.folder / POINTER) as file_:
+            file_.write(f"{name}\n")
+        _to_disk(self.folder)
+        self._tidy(name)
+        return path
+
+    @property
+    def empty(self) -> bool:
+        """No checkpoint was ever whole."""
+        return not (self.folder / POINTER).is_file()
+
+    def latest(self) -> Path:
+        """The newest checkpoint, its files as they were written.
+
+        Raises:
+            InputError: there is none, or a file is missing, cut off or changed; says what else there is.
+        """
+        if self.empty:
+            raise InputError(f"'{self.folder}' holds no checkpoint.")
+        path = self.folder / (self.folder / POINTER).read_text(encoding="utf-8").strip()
+        try:
+            hashes = json.loads((path / HASHES).read_text(encoding="utf-8"))
+            bad = [name for name, wanted in hashes.items() if digest(path / name) != wanted]
+        except (OSError, ValueError, AttributeError) as error:
+            said = error.strerror if isinstance(error, OSError) else f"{HASHES} is no whole JSON"
+            raise InputError(f"checkpoint '{path}' cannot be read ({said}).{self._others(path)}") from None
+        if bad:
+            raise InputError(f"checkpoint '{path}': {bad[0]} is cut off or was changed.{self._others(path)}")
+        return path
+
+    def _others(self, path: Path) -> str:
+        """Where to go on from instead."""
+        older = sorted(
+            p.name for p in self.folder.iterdir() if (p / HASHES).is_file() and p != path and p.name < path.name
+        )
+        return f" To go on from the one before, write {older[-1]} into '{self.folder / POINTER}'." if older else ""
+
+    def _tidy(self, newest: str) -> None:
+        """Remove what is not kept, and what a killed process left."""
+        found = sorted(p for p in self.folder.iterdir() if p.is_dir())
+        whole = [p for p in found if not p.name.startswith(".") and p.name <= newest]
+        for path in found:
+            if path not in whole[-self.keep :]:
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    found = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(BLOCK):
+            found.update(block)
+    return found.hexdigest()
+
+
+def _to_disk(path: Path) -> None:
+    """Out of the system's memory, so that a power failure leaves whole checkpoints too."""
+    if os.name == "nt":
+        return  # Windows cannot open folders, and keeps the order of renames by its journal.
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

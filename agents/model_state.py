@@ -1,0 +1,138 @@
+"""Everything a training goes on from, as files: networks, optimisers, statistics, replay buffer, random states.
+
+model.zip is what Stable-Baselines3 writes, for others to read. Of it only the tensors are read back, with PyTorch's
+loader of weights: the pickles in it, which could run code, are never opened. The rest is NumPy's format.
+"""
+
+from __future__ import annotations
+
+import io
+import random
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
+from stable_baselines3.common.vec_env import VecNormalize
+
+from dms_core.errors import InputError
+
+MODEL, STATISTICS, REPLAY, RANDOM = "model.zip", "statistics.npz", "replay.npz", "random.npz"
+COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+"""Of a replay buffer."""
+
+
+def save_state(model: BaseAlgorithm, folder: Path) -> None:
+    """Write everything into a folder."""
+    save_model(model, folder)
+    if isinstance(model, OffPolicyAlgorithm):
+        _save_replay(model, folder / REPLAY)
+    kind, keys, position, has_gauss, gauss = np.random.get_state()
+    of_python = random.getstate()
+    _write(
+        folder / RANDOM, torch=torch.get_rng_state().numpy(), numpy=np.array(keys),
+        numpy_rest=np.array([position, has_gauss, gauss], float), python=np.array(of_python[1]),
+    )  # fmt: skip
+
+
+def save_model(model: BaseAlgorithm, folder: Path) -> None:
+    """Write networks and statistics into a folder."""
+    content = io.BytesIO()
+    model.save(content)
+    (folder / MODEL).write_bytes(content.getvalue())
+    if (statistics := model.get_vec_normalize_env()) is not None:
+        found: dict[str, Any] = {}
+        for name, one in _running(statistics).items():
+            found |= {f"{name}_mean": one.mean, f"{name}_var": one.var, f"{name}_count": one.count}
+        _write(folder / STATISTICS, **found)
+
+
+def load_state(model: BaseAlgorithm, folder: Path) -> None:
+    """Put everything from a folder into a fresh model of the same configuration.
+
+    Raises:
+        InputError: a file is cut off, or belongs to another configuration; names it.
+    """
+    try:
+        _load_networks(model, folder / MODEL)
+        if (statistics := model.get_vec_normalize_env()) is not None:
+            _load_statistics(statistics, folder / STATISTICS)
+        if isinstance(model, OffPolicyAlgorithm):
+            _load_replay(model, folder / REPLAY)
+        found = _read(folder / RANDOM)
+        torch.set_rng_state(torch.from_numpy(found["torch"]))
+        position, has_gauss, gauss = found["numpy_rest"]
+        np.random.set_state(("MT19937", found["numpy"], int(position), int(has_gauss), float(gauss)))
+        random.setstate((3, tuple(int(x) for x in found["python"]), None))
+    except OSError as error:
+        raise InputError(f"'{error.filename}' cannot be read: {error.strerror}.") from None
+
+
+def _load_networks(model: BaseAlgorithm, path: Path) -> None:
+    """Weights and optimisers."""
+    try:
+        _, tensors, variables = load_from_zip_file(io.BytesIO(path.read_bytes()), device=model.device, load_data=False)
+        model.set_parameters(tensors, exact_match=True, device=model.device)
+        for name, value in (variables or {}).items():
+            recursive_setattr(model, f"{name}.data", value.data)
+    except (ValueError, RuntimeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        said = " ".join(str(error).split())[:200]
+        raise InputError(f"'{path}' does not hold the networks of this configuration: {said}") from None
+
+
+def _running(statistics: VecNormalize) -> dict[str, Any]:
+    """Running statistics by name."""
+    return {"observation": statistics.obs_rms, "return": statistics.ret_rms}
+
+
+def _load_statistics(statistics: VecNormalize, path: Path) -> None:
+    """Means and variances."""
+    found = _read(path)
+    for name, one in _running(statistics).items():
+        mean, var = _of_shape(path, found, f"{name}_mean", one.mean), _of_shape(path, found, f"{name}_var", one.var)
+        one.mean, one.var, one.count = mean, var, float(found[f"{name}_count"])
+
+
+def _save_replay(model: OffPolicyAlgorithm, path: Path) -> None:
+    """The part of the buffer that is filled."""
+    buffer: Any = model.replay_buffer
+    size = buffer.size()
+    columns = {name: getattr(buffer, name)[:size] for name in COLUMNS}
+    np.savez(path, allow_pickle=False, place=np.array([buffer.pos, buffer.full]), **columns)
+
+
+def _load_replay(model: OffPolicyAlgorithm, path: Path) -> None:
+    """Into an empty buffer of the same size."""
+    buffer, found = model.replay_buffer, _read(path)
+    assert buffer is not None
+    for name in COLUMNS:
+        column, place = found.get(name), getattr(buffer, name)
+        if column is None or column.shape[1:] != place.shape[1:] or len(column) > len(place):
+            raise InputError(f"'{path}' does not hold the replay buffer of this configuration: {name} does not fit.")
+        place[: len(column)] = column
+    buffer.pos, buffer.full = int(found["place"][0]), bool(found["place"][1])
+
+
+def _write(path: Path, **arrays: Any) -> None:
+    np.savez(path, allow_pickle=False, **arrays)
+
+
+def _read(path: Path) -> Mapping[str, np.ndarray]:
+    """Arrays of a file; pickles are refused."""
+    try:
+        with np.load(path, allow_pickle=False) as found:
+            return dict(found)
+    except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"'{path}' is cut off or no NumPy archive: {error}.") from None
+
+
+def _of_shape(path: Path, found: Mapping[str, np.ndarray], name: str, like: Any) -> np.ndarray:
+    """An array that has to have the shape of another."""
+    if name not in found or found[name].shape != np.shape(like):
+        raise InputError(f"'{path}' does not hold the statistics of this configuration: {name} does not fit.")
+    return found[name]

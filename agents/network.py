@@ -1,0 +1,126 @@
+"""The networks of trained policies in numpy: normalised observation, LSTM cells if any, layers, squashed output.
+
+Numbers are double precision although PyTorch trains in single: what differs is PyTorch's own round-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from dms_core.errors import InputError
+from exo_env.settings import Settings
+
+ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "tanh": np.tanh,
+    "relu": lambda x: np.maximum(x, 0.0),
+    "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+    "silu": lambda x: x * sigmoid(x),
+    "leakyrelu": lambda x: np.where(x > 0.0, x, 0.01 * x),
+}
+"""Of PyTorch with its default arguments."""
+
+
+class Architecture(Settings):
+    """Shape of a network; its numbers are arrays by name (`names`)."""
+
+    inputs: int = Field(ge=1, description="components of what it sees, stacked observations included")
+    n_stack: int = Field(default=1, ge=1, description="observations that it sees at once, the newest last")
+    hidden: tuple[int, ...] = Field(description="widths of the layers before the output")
+    outputs: int = Field(default=2, ge=1)
+    activation: str = Field(description="between the layers")
+    lstm_layers: int = Field(default=0, ge=0, description="of LSTM cells before the layers")
+    lstm_width: int = Field(default=0, ge=0)
+    output: Literal["clip", "tanh"] = Field(description="how the output becomes an action from -1 to 1")
+    normalised: bool = Field(description="observations are normalised by `mean` and `variance`")
+    clip: float = Field(default=10.0, gt=0.0, description="largest normalised observation")
+    epsilon: float = Field(default=1e-8, gt=0.0, description="added to the variance")
+
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each array."""
+        found: dict[str, tuple[int, ...]] = {}
+        if self.normalised:
+            found |= {"mean": (self.inputs,), "variance": (self.inputs,)}
+        width, gates = self.inputs, 4 * self.lstm_width
+        for k in range(self.lstm_layers):
+            found |= {f"lstm.{k}.input": (gates, width), f"lstm.{k}.state": (gates, self.lstm_width)}
+            found |= {f"lstm.{k}.input_bias": (gates,), f"lstm.{k}.state_bias": (gates,)}
+            width = self.lstm_width
+        for k, size in enumerate((*self.hidden, self.outputs)):
+            found |= {f"layer.{k}.weight": (size, width), f"layer.{k}.bias": (size,)}
+            width = size
+        return found
+
+
+class Network:
+    """A network that acts.
+
+    Args:
+        shape: of the network.
+        arrays: its numbers.
+
+    Raises:
+        InputError: an array is missing, has another shape or is not finite.
+    """
+
+    def __init__(self, shape: Architecture, arrays: Mapping[str, np.ndarray]) -> None:
+        if shape.activation not in ACTIVATIONS:
+            raise InputError(f"activation '{shape.activation}' is unknown; there are {', '.join(ACTIVATIONS)}.")
+        for name, wanted in shape.shapes().items():
+            if name not in arrays:
+                raise InputError(f"the weights lack '{name}'.")
+            if arrays[name].shape != wanted:
+                raise InputError(f"weights '{name}' have shape {arrays[name].shape}; {wanted} is wanted.")
+            if not np.isfinite(arrays[name]).all():
+                raise InputError(f"weights '{name}' are not finite.")
+        self.shape = shape
+        self._arrays = {name: np.asarray(arrays[name], dtype=float) for name in shape.shapes()}
+        self._activation = ACTIVATIONS[shape.activation]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was seen."""
+        s = self.shape
+        self._seen = np.zeros(s.inputs, dtype=np.float32)
+        self._hidden = np.zeros((s.lstm_layers, s.lstm_width))
+        self._cell = np.zeros((s.lstm_layers, s.lstm_width))
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """The action that the policy holds best, shape (outputs,), after one more observation."""
+        s, size = self.shape, observation.size
+        self._seen = np.concatenate([self._seen[size:], observation.astype(np.float32)])
+        x = self.normalise(self._seen)
+        for k in range(s.lstm_layers):
+            x = self._lstm(k, x)
+        last = len(s.hidden)
+        for k in range(last + 1):
+            x = self._arrays[f"layer.{k}.weight"] @ x + self._arrays[f"layer.{k}.bias"]
+            x = self._activation(x) if k < last else x
+        return np.tanh(x) if s.output == "tanh" else np.clip(x, -1.0, 1.0)
+
+    def normalise(self, seen: np.ndarray) -> np.ndarray:
+        """What the first layer gets."""
+        s = self.shape
+        if not s.normalised:
+            return seen.astype(float)
+        scaled = (seen - self._arrays["mean"]) / np.sqrt(self._arrays["variance"] + s.epsilon)
+        return np.clip(scaled, -s.clip, s.clip)
+
+    def _lstm(self, k: int, x: np.ndarray) -> np.ndarray:
+        """One cell of layer k (Hochreiter and Schmidhuber 1997, with forget gate), gates in PyTorch's order."""
+        a, h, c = self._arrays, self._hidden[k], self._cell[k]
+        gates = a[f"lstm.{k}.input"] @ x + a[f"lstm.{k}.input_bias"]
+        gates = gates + a[f"lstm.{k}.state"] @ h + a[f"lstm.{k}.state_bias"]
+        enter, forget, new, leave = np.split(gates, 4)
+        c = sigmoid(forget) * c + sigmoid(enter) * np.tanh(new)
+        h = sigmoid(leave) * np.tanh(c)
+        self._hidden[k], self._cell[k] = h, c
+        return h
+
+
+def sigmoid(x: np.ndarray) -> np.ndarray:
+    """1 / (1 + exp(-x)), by tanh, which does not overflow."""
+    return 0.5 * (1.0 + np.tanh(0.5 * x))

@@ -1,0 +1,199 @@
+"""`python -m agents report`: tables and figures from what trainings and evaluations left behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from agents import report_figures
+from agents.baselines import POLICIES
+from agents.config import Config
+from agents.courses import Course, course
+from agents.evaluate import table_rows
+from agents.figure import require_matplotlib
+from agents.learned import find_policy
+from agents.policy import Policy
+from agents.report_figures import Group
+from agents.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
+from dms_core.errors import InputError
+from dms_core.output_file import check_writable, whole_file
+from exo_env.population import population, shipped_populations
+
+EVALUATION = "evaluation.json"
+
+
+def report(
+    runs: Positional[tuple[Path, ...]],
+    out: Path,
+    policy_names: Annotated[tuple[str, ...], arg(name="policies", metavar="A B")] = (),
+    mild: str = "stroke_mild",
+    severe: str = "stroke_severe",
+    seed: int = 0,
+) -> int:
+    """Rebuild tables and figures: learning curves, tracking over help, patients over time, the worst patient.
+
+    Args:
+        runs: folders of trainings, and evaluation.json files or their folders.
+        out: folder for report.md and its pictures; made where it is missing.
+        policy_names: two to show over time; the best trained one and the best baseline where none are given.
+        mild: population of the first patient over time.
+        severe: population of the second.
+        seed: of these patients.
+    """
+    require_matplotlib()
+    trainings, evaluations = collected(runs)
+    check_writable(out / "report.md")
+    lines = ["# Report", ""]
+    if trainings:
+        lines += _trainings(out, trainings)
+    for k, results in enumerate(evaluations):
+        lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
+    shown = _shown(policy_names, evaluations, trainings)
+    if shown:
+        lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed)
+    if shown and evaluations:
+        lines += _worst(out, shown, evaluations[0])
+    with whole_file(out / "report.md") as file:
+        file.write("\n".join(lines))
+    print(f"written: {out}")
+    return 0
+
+
+def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], list[dict[str, Any]]]:
+    """Learning curves by folder, and evaluations; those of the same patients are one.
+
+    Raises:
+        InputError: a path is neither, or a file is not whole.
+    """
+    if not paths:
+        raise InputError("folders of trainings or evaluation.json files are wanted.")
+    trainings: dict[Path, list[dict[str, Any]]] = {}
+    evaluations: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for path in paths:
+        if (path / RECORD).is_file():
+            trainings[path] = _json(path / EVALUATIONS) if (path / EVALUATIONS).is_file() else []
+        elif path.is_file() or (path / EVALUATION).is_file():
+            found = _json(path if path.is_file() else path / EVALUATION)
+            if not isinstance(found, dict) or not {"population", "patients", "seed", "policies"} <= found.keys():
+                raise InputError(f"'{path}' is not an evaluation.")
+            key = tuple(found[k] for k in ("population", "patients", "seed"))
+            known = evaluations.setdefault(key, {**found, "policies": {}})
+            known["policies"] |= found["policies"]
+        else:
+            raise InputError(f"'{path}' is neither the folder of a training nor an evaluation.")
+    return trainings, list(evaluations.values())
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read: {error}.") from None
+
+
+def grouped(trainings: Mapping[Path, list[dict[str, Any]]]) -> list[Group]:
+    """Trainings of one configuration together."""
+    found: dict[str, list[Path]] = {}
+    for path in trainings:
+        content = Config.read(path / CONFIG).content()
+        found.setdefault(json.dumps(content, sort_keys=True), []).append(path)
+    names = [read_record(paths[0])["algorithm"] for paths in found.values()]
+    groups = []
+    for name, paths in zip(names, found.values(), strict=True):
+        label = name if names.count(name) == 1 else f"{name}, {paths[0].name}"
+        groups.append(Group(label, [trainings[p] for p in paths if trainings[p]]))
+    return [g for g in groups if g.curves]
+
+
+def _trainings(out: Path, trainings: Mapping[Path, list[dict[str, Any]]]) -> list[str]:
+    """Figure and table of the learning curves."""
+    groups = grouped(trainings)
+    if groups:
+        report_figures.learning_curves(out / "learning_curves.png", groups)
+    lines = [
+        "## Trainings",
+        "",
+        "| run | algorithm | seed | steps | time [s] | best return | tracking [deg] | device share |",
+        f"|{'---|' * 8}",
+    ]
+    for path, curve in trainings.items():
+        record = read_record(path)
+        who = f"{path.name} | {record['algorithm']} | {record['seed']}"
+        if not curve:
+            lines.append(f"| {who} | no evaluation yet | | | | |")
+            continue
+        best, last = max(curve, key=lambda e: e["return"]), curve[-1]
+        numbers = " | ".join(_number(best[k]) for k in ("return", "tracking_rms_deg", "device_work_share"))
+        lines.append(f"| {who} | {last['steps']} | {last['seconds']:.0f} | {numbers} |")
+    return [*lines, "", *(["![Learning curves](learning_curves.png)", ""] if groups else [])]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
+    """Figure and table of an evaluation."""
+    for found in results["policies"].values():
+        for estimate in found["summary"].values():
+            estimate.update({k: float("nan") for k, v in estimate.items() if v is None})
+    report_figures.pareto(out / f"pareto{suffix}.png", results)
+    head, *rows = table_rows(results)
+    lines = [
+        f"## {results['patients']} patients, {results['population']}, seed {results['seed']}", "",
+        f"Interquartile mean [{100 * results['confidence']:g} % bootstrap interval].", "",
+        f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
+        f"![Tracking over the share of the device](pareto{suffix}.png)", "",
+    ]  # fmt: skip
+    return lines
+
+
+def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], trainings: Mapping[Path, Any]) -> list[Policy]:
+    """The two policies to show over time."""
+    if names:
+        if len(set(names)) != 2:
+            raise InputError(f"--policies {' '.join(names)}: two different names are wanted.")
+        return [find_policy(name) for name in names]
+    found = evaluations[0]["policies"] if evaluations else {}
+    ranked = sorted(found, key=lambda n: found[n]["summary"]["return"]["value"], reverse=True)
+    learned = [n for n in ranked if n not in POLICIES] + [str(path) for path, curve in trainings.items() if curve]
+    baselines = [n for n in ranked if n in POLICIES] + ["pid", "none"]
+    shown: list[Policy] = []
+    for name in dict.fromkeys([*learned[:1], *baselines]):
+        # The folder of a policy that was evaluated may be gone.
+        if name in POLICIES or Path(name).is_dir():
+            shown.append(find_policy(name))
+    return shown[:2]
+
+
+def _patients(out: Path, shown: Sequence[Policy], whom: Mapping[str, str], seed: int) -> list[str]:
+    """Figure of patients over time."""
+    columns = {title: [course(p, source, seed) for p in shown] for title, source in whom.items()}
+    report_figures.courses(out / "patients.png", columns)
+    return ["## Patients over time", "", "![Two patients under two policies](patients.png)", ""]
+
+
+def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> list[str]:
+    """Figure of the patient with whom the first policy that was evaluated did worst."""
+    judged = next((p for p in shown if p.name in results["policies"]), None)
+    if judged is None:
+        return []
+    episodes = results["policies"][judged.name]["episodes"]
+    worst = max(episodes, key=lambda e: (e["measures"]["unsafe"], e["measures"]["tracking_rms_deg"]))
+    columns = {f"worst of {len(episodes)} patients with {judged.title}": [_again(p, worst, results) for p in shown]}
+    report_figures.courses(out / "worst_patient.png", columns)
+    m = worst["measures"]
+    said = worst["event"] or f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
+    return [f"## Worst patient of {judged.title}", "", said, "", "![The worst patient](worst_patient.png)", ""]
+
+
+def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -> Course:
+    """An episode of an evaluation once more: to the last bit where its population is a shipped one."""
+    for name in shipped_populations():
+        if population(name).title == results["population"]:
+            return course(policy, name, one["seed"])
+    return course(policy, one["patient"], one["seed"], {k: one[k] for k in ("load", "reference")})

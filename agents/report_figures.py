@@ -1,0 +1,171 @@
+"""The figures of a report: learning curves, what tracking costs in help, and patients over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.courses import Course
+from agents.figure import COLOURS, RESOLUTION, save
+
+CURVES = (
+    ("return", "return of an episode"),
+    ("tracking_rms_deg", "tracking, rms [deg]"),
+    ("device_work_share", "work of the device [-]"),
+)
+MARKERS = "osD^vP*X"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Trainings that differ in nothing but their seed."""
+
+    label: str
+    curves: list[list[dict[str, Any]]]
+    """Evaluations of each seed."""
+
+
+def learning_curves(path: Path, groups: Sequence[Group]) -> None:
+    """Mean over the seeds and, as a band, the lowest to the highest of them."""
+    figure, axes = _panels(1, len(CURVES), (3.4 * len(CURVES), 3.4))
+    for ax, (name, label) in zip(axes.flat, CURVES, strict=True):
+        for k, group in enumerate(groups):
+            steps, values = on_common_steps(group.curves, name)
+            colour, n = COLOURS[k % len(COLOURS)], len(group.curves)
+            seeds = f"{n} seed{'s' * (n > 1)}"
+            ax.plot(steps, values.mean(axis=0), color=colour, marker=".", label=f"{group.label} ({seeds})")
+            ax.fill_between(steps, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0.0)
+        ax.set_xlabel("environment steps")
+        ax.set_title(label, fontsize=10)
+        ax.ticklabel_format(axis="x", style="sci", scilimits=(0, 4), useMathText=True)
+    _legend(figure, axes.flat[0])
+    save(figure, path)
+
+
+def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Curves at the steps of all of them, up to the end of the shortest.
+
+    Returns:
+        Steps, shape (m,), and values, shape (curves, m); what could not be measured is bridged.
+    """
+    kept = [[(e["steps"], e[name]) for e in curve if e[name] is not None] for curve in curves]
+    kept = [pairs for pairs in kept if pairs]
+    if not kept:
+        return np.zeros(0), np.zeros((1, 0))
+    end, begin = min(pairs[-1][0] for pairs in kept), max(pairs[0][0] for pairs in kept)
+    steps = np.array(sorted({s for pairs in kept for s, _ in pairs if begin <= s <= end}), dtype=float)
+    columns = [np.array(pairs, dtype=float).T for pairs in kept]
+    return steps, np.array([np.interp(steps, x, y) for x, y in columns])
+
+
+def pareto(path: Path, results: Mapping[str, Any]) -> None:
+    """Tracking over the share of the work that the device does: low is good in both, and one costs the other."""
+    figure, axes = _panels(1, 1, (6.4, 4.4))
+    (ax,) = axes.flat
+    for k, found in enumerate(results["policies"].values()):
+        x, y = (found["summary"][name] for name in ("device_work_share", "tracking_rms_deg"))
+        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
+        whiskers = [[[v["value"] - v["low"]], [v["high"] - v["value"]]] for v in (x, y)]
+        ax.errorbar(
+            x["value"], y["value"], xerr=whiskers[0], yerr=whiskers[1], color=colour, marker=marker, markersize=7,
+            linewidth=1.2, capsize=3, linestyle="", label=found["title"],
+        )  # fmt: skip
+    _front(ax, list(results["policies"].values()))
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.grid(True, which="minor", axis="y", color="0.94", linewidth=0.4)
+    ax.set_xlabel("share of the device in the positive work [-]")
+    ax.set_ylabel("tracking error, rms [deg]")
+    percent = 100.0 * results["confidence"]
+    ax.set_title(
+        f"{results['patients']} patients, {results['population']}\ninterquartile mean, {percent:g} % interval; "
+        "low is good in both, dotted: beaten by none",
+        fontsize=9,
+    )
+    _legend(figure, ax, 3)
+    save(figure, path)
+
+
+def _front(ax: Any, policies: Sequence[Mapping[str, Any]]) -> None:
+    """A line along the policies that none other beats in both."""
+    points = [[p["summary"][name]["value"] for name in ("device_work_share", "tracking_rms_deg")] for p in policies]
+    best = sorted(p for p in points if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points))
+    ax.step(*zip(*best, strict=True), where="post", color="0.7", linewidth=1.0, linestyle=":", zorder=0)
+
+
+ROWS = (
+    ("elbow flexion [deg]", ""),
+    ("error [deg]", ""),
+    ("rope tension [N]", "solid: agonist, dashed: antagonist"),
+    ("moment [Nm]", "solid: device, dashed: muscles"),
+    ("effort [-]", ""),
+)
+
+
+def courses(path: Path, columns: Mapping[str, Sequence[Course]]) -> None:
+    """Patients over time, a column a patient, a colour a policy."""
+    figure, axes = _panels(len(ROWS), len(columns), (1.2 + 4.4 * len(columns), 9.6), sharey="row")
+    for column, (title, found) in zip(axes.T, columns.items(), strict=True):
+        y = max((one.columns for one in found), key=lambda c: len(c["time"]))
+        column[0].plot(y["time"], np.degrees(y["reference"]), color="0.55", linewidth=3.5, alpha=0.6, label="reference")
+        for k, one in enumerate(found):
+            _course(column, one, COLOURS[k])
+        column[0].set_title(f"{title}\n{found[0].who}", fontsize=9)
+        column[-1].set_xlabel("time [s]")
+        column[-1].set_ylim(-0.05, 1.05)
+    for ax, (label, lines) in zip(axes[:, 0], ROWS, strict=True):
+        ax.set_ylabel(label)
+        for other in axes[list(axes[:, 0]).index(ax)] if lines else ():
+            other.set_title(lines, fontsize=7, loc="right", pad=2, color="0.3")
+    figure.align_ylabels()
+    _legend(figure, axes[0, 0])
+    save(figure, path)
+
+
+def _course(column: Any, one: Course, colour: str) -> None:
+    """The lines of one episode, and a cross where an event ended it."""
+    angle, error, tension, moment, effort = column
+    y, dashes = one.columns, (0, (4, 2))
+    t, shown = y["time"], np.degrees(y["elbow_angle.angle"])
+    angle.plot(t, shown, color=colour, label=one.policy)
+    error.plot(t, shown - np.degrees(y["reference"]), color=colour)
+    tension.plot(t, y["agonist_tension"], color=colour)
+    tension.plot(t, y["antagonist_tension"], color=colour, linestyle=dashes, linewidth=1.0)
+    moment.plot(t, y["exo_moment"], color=colour)
+    moment.plot(t, y["muscle_moment"], color=colour, linestyle=dashes, linewidth=1.0)
+    effort.plot(t, y["effort"], color=colour)
+    if one.event is not None:
+        angle.plot(t[-1], shown[-1], "x", color=colour, markersize=9, markeredgewidth=2.5)
+        angle.annotate(
+            _short(one.event), (t[-1], shown[-1]), xytext=(8, 0), textcoords="offset points", va="center", fontsize=7,
+            color=colour,
+        )  # fmt: skip
+
+
+def _short(event: str) -> str:
+    """The first words of what ended an episode."""
+    return event if len(event) <= 60 else event[:57].rsplit(" ", 1)[0] + " ..."
+
+
+def _panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:
+    """A figure with panels, drawn by software."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, dpi=RESOLUTION, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, columns, sharex="col", squeeze=False, **shared)
+    for ax in axes.flat:
+        ax.grid(True, color="0.9", linewidth=0.6)
+        ax.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _legend(figure: Any, ax: Any, columns: int = 4) -> None:
+    """Above the panels, never on a curve."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False, fontsize=8)
