@@ -137,11 +137,11 @@ def reset_effort(par, state, n, period, wanted, phase):
     """State of a patient who has wanted `wanted` for long, rested but for what was fatigued before."""
     state[:] = 0.0
     state[STATE.phase] = phase
-    state[STATE.effort] = 1.0
+    state[STATE.effort] = par[PATIENT.effort_at_start]
     for k in range(N):
         state[STATE.fatigued + k] = par[PATIENT.fatigued_at_start]
         for i in range(n):
-            state[STATE.memory + (RING.command + k) * n + i] = wanted[k]
+            state[STATE.memory + (RING.command + k) * n + i] = state[STATE.effort] * wanted[k]
     for k in range(N):
         share = wanted_share(par, state, n, period, k)
         drive = voluntary_drive(par, state, k, share)

@@ -136,6 +136,11 @@ class Patient(Settings):
     least_effort: float = Field(
         default=0.0, ge=0.0, le=1.0, description="share of the command at which forgetting ends [-]; assumed"
     )
+    effort_at_start: float = Field(
+        default=1.0, ge=0.0, le=2.0,
+        description="effort that the repetitions before this one have left, as a multiple of the plan [-]; it goes on "
+        "from one movement to the next [Emken 2007]; value assumed",
+    )  # fmt: skip
     feedback_gain: float = Field(
         default=0.0, ge=0.0, le=5.0,
         description="proprioceptive feedback: excitation of the flexors, before weakness, per tracking error [1/rad]; "
@@ -189,6 +194,7 @@ class PatientIndex(NamedTuple):
     least_effort: int = 18
     feedback_gain: int = 19
     feedback_delay: int = 20
+    effort_at_start: int = 21
 
 
 PATIENT = PatientIndex()
