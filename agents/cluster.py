@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ POLL = 0.5
 """Between two looks at who is done [s]."""
 PATIENCE = 10.0
 """Until a cluster that does not answer is given up [s]."""
+TOKEN = "(Where the cluster wants a token, set RAY_AUTH_MODE=token and RAY_AUTH_TOKEN as it was started with.)"
 LEFT_BEHIND = ["/.git", "/.venv", "/out", "/build", "/dist", "__pycache__"]
 """Not sent to a cluster."""
 
@@ -34,7 +36,8 @@ def share_out(
     Args:
         function: of a module that workers can import.
         shares: arguments of each call.
-        address: of a cluster, or 'auto' for that of this machine; a local one is started where it is not given.
+        address: of a cluster, or 'auto' for that of this machine; a local one is started where it is not given. A
+            cluster with a token (the default of Ray 2.59 and later) reads it from RAY_AUTH_MODE and RAY_AUTH_TOKEN.
         cpus: of a local one; all there are where it is not given.
         done: called with the number of a share that is done.
         waiting: called again and again while others work.
@@ -83,7 +86,8 @@ def _started(address: str | None, cpus: int | None) -> Any:
             ray.init(address, runtime_env={"working_dir": str(ROOT), "excludes": LEFT_BEHIND}, **quiet)
     except (ConnectionError, ValueError, RuntimeError, OSError) as error:
         said = " ".join(str(error).split())[:200]
-        raise DmsError(f"Ray at '{address or 'local'}' cannot be reached: {said}") from None
+        hint = "" if address is None or os.environ.get("RAY_AUTH_TOKEN") else f" {TOKEN}"
+        raise DmsError(f"Ray at '{address or 'local'}' cannot be reached: {said}{hint}") from None
     return ray
 
 
