@@ -1,6 +1,6 @@
 """Numbers of the baselines: where they may lie, and those that `python -m agents tune-baselines` found.
 
-They stand in configs/agents/baselines.yml, a policy a key, and are the ones that a policy uses by default.
+They stand in configs/baselines/baselines.yml, a policy a key, and are the ones that a policy uses by default.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dms_core.config_files import configs
 from dms_core.errors import InputError
 from dms_core.yaml_text import read_yaml
 
-FILE = "agents/baselines.yml"
+FILE = "baselines/baselines.yml"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ def test_places_in_a_range():
 
 
 def test_shipped_numbers_are_complete_and_within_their_ranges():
-    shipped = read_yaml(configs() / "agents/baselines.yml")
+    shipped = read_yaml(configs() / "baselines/baselines.yml")
     assert shipped.keys() == tunable().keys()
     for name, ranges in tunable().items():
         assert shipped[name].keys() == ranges.keys()
@@ -36,8 +36,8 @@ def test_shipped_numbers_are_complete_and_within_their_ranges():
 
 
 def test_shipped_numbers_are_the_best_of_the_table_of_tries():
-    shipped = read_yaml(configs() / "agents/baselines.yml")
-    with (configs() / "agents/baselines_tries.csv").open() as file:
+    shipped = read_yaml(configs() / "baselines/baselines.yml")
+    with (configs() / "baselines/baselines_tries.csv").open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     for name in tunable():
         best = max((r for r in rows if r["policy"] == name), key=lambda r: float(r["return"]))
