@@ -229,7 +229,8 @@ def newton(m, s, o, c0, close):
             return STALE_MATRIX, k
         x_before[:] = x
         before = norm
-        if k > 0 and fresh and norm * contraction ** (MAX_ITERATIONS - 1 - k) > o.newton_tol:
+        rest = norm * contraction ** (MAX_ITERATIONS - 1 - k) / (1.0 - contraction)
+        if k > 0 and fresh and rest > o.newton_tol:
             # Too slow to end in time (Hairer and Wanner 1996, IV.8), as where a kink lies between guess and solution: a
             # fibre that stops shortening needs the matrix of the far side.
             if not refresh(m, s, c0):
