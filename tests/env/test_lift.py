@@ -8,9 +8,9 @@ import pytest
 from dms_core.results import Result
 from dms_core.simulation.state import Options
 from exo_env.actions import RopeTension
+from exo_env.control_period import device_share
 from exo_env.lift_env import ElbowLiftEnv
 from exo_env.observations import Observer, imperfect, truth_of
-from exo_env.control_period import device_share
 from exo_env.repetition import Repetition
 from exo_env.rewards import TERMS, Weights, term_values
 from exo_env.soak import soak
