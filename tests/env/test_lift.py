@@ -247,7 +247,7 @@ def test_readings_hold_what_the_figures_show(env):
 
 
 def test_default_tolerance_is_finer_than_the_encoder():
-    """the default tolerance against 1e-5 under the same rough actions: within a fifth of the encoder's step of 0.0015 rad."""
+    """The default against 1e-5 under the same rough actions: within a fifth of the encoder's step of 0.0015 rad."""
     angles = []
     for rtol in (None, 1e-5):
         env, actions = ElbowLiftEnv(rtol=rtol, patient="stroke_mild"), np.random.default_rng(0)
