@@ -260,6 +260,15 @@ def test_default_tolerance_is_finer_than_the_encoder():
     np.testing.assert_allclose(angles[0], angles[1], atol=3e-4)
 
 
+def test_a_slow_iteration_renews_its_matrix():
+    """At this tolerance fibres stop shortening between guess and solution, and an old test of slowness gave up there."""
+    env = ElbowLiftEnv(action_mode="pid_setpoint", noise=False, rtol=0.1)
+    env.reset(seed=0)
+    for k in range(20):
+        *_, info = env.step(np.array([0.0, 1.0]))
+        assert not info["solver_failed"], k
+
+
 @pytest.mark.parametrize(("mode", "steps"), [("rope_tension", 1500), ("pid_setpoint", 500)])
 def test_random_actions_over_the_evaluation_population(mode, steps):
     found = soak(steps, action_mode=mode)
