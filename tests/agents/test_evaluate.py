@@ -34,7 +34,7 @@ def test_every_policy_meets_the_same_patients():
 
 
 def test_who_can_do_something_is_summed_up_apart():
-    weak = {"base": "stroke_severe", "fields": {"maximum_activation_flexors": {"uniform": [0.0, 0.06]}}}
+    weak = {"base": "stroke_severe", "fields": {"maximum_activation_flexors": {"uniform": [0.0, 0.1]}}}
     found = evaluate([policy("none"), policy("pid")], weak, 6, 2, **SHORT)
     for one in found["policies"].values():
         able = [e["measures"]["return"] for e in one["episodes"] if e["ability"] >= 0.2]
