@@ -94,7 +94,9 @@ class TrainingRun:
             raise DmsError(f"after {self.steps} steps the networks have diverged. {self._advice()}") from None
         finally:
             self.env.close()
-            self.model.get_env().close()  # type: ignore[union-attr]
+            worlds = self.model.get_env()
+            if worlds is not None:
+                worlds.close()
             self.model.logger.close()
         return done
 
