@@ -69,7 +69,7 @@ class Batch:
     """
 
     def __init__(self, size: int, observed: int, threads: int | None = None) -> None:
-        self.threads = min(size, threads or len(os.sched_getaffinity(0)))
+        self.threads = min(size, threads or _cores())
         self._addresses = np.zeros(size, np.int64)
         self.observations = np.zeros((size, observed), np.float32)
         self.numbers = np.zeros((size, len(NUMBERS)))
@@ -101,6 +101,11 @@ class Batch:
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
+
+
+def _cores() -> int:
+    """That this process may use, where the system says so."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _run(given: tuple[np.ndarray, ...], first: int, last: int) -> None:
