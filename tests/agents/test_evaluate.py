@@ -8,7 +8,7 @@ import pytest
 
 from agents.__main__ import main
 from agents.baselines import POLICIES, policy
-from agents.evaluate import evaluate, patient_seeds, table
+from agents.evaluate import by_patient, evaluate, patient_seeds, table
 from agents.measures import MEASURES
 from agents.statistics import interquartile_mean
 
@@ -95,3 +95,17 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
 def test_policies_lists_all(capsys):
     assert main(["policies"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(POLICIES)
+
+
+def test_loads_are_lifted_by_every_patient_and_averaged():
+    found = evaluate([policy("none"), policy("pid")], "stroke_mild", 2, 3, loads=(0.6, 1.4), **SHORT)
+    one, other = (found["policies"][name] for name in ("none", "pid"))
+    assert [e["load"] for e in one["episodes"]] == [0.6, 1.4, 0.6, 1.4]
+    assert one["episodes"][0]["patient"] == one["episodes"][1]["patient"] != one["episodes"][2]["patient"]
+    values = [e["measures"]["return"] for e in one["episodes"]]
+    means = [(values[0] + values[1]) / 2, (values[2] + values[3]) / 2]
+    np.testing.assert_allclose(by_patient(one["episodes"], "return"), means)
+    assert one["summary"]["return"]["count"] == 2
+    wanted = np.mean(by_patient(other["episodes"], "return") - means)
+    assert other["difference"]["return"]["value"] == pytest.approx(wanted)
+    assert one["difference"]["return"]["value"] == 0.0
