@@ -98,7 +98,7 @@ class Plant(NamedTuple):
     drive: np.ndarray
     """Offset and gain from an action to a command, and the command's largest change in a period, (2, 3)."""
     commands: np.ndarray
-    """Held at the end of the last period, (2,)."""
+    """Reached at the end of the last period, (2,)."""
     excitations: np.ndarray
     stretch: np.ndarray
     inputs: np.ndarray
@@ -264,7 +264,7 @@ def finish(p):
 
 @compiled
 def run_period(p, action):
-    """Hold an action over one control period; gives the solver's code. Where it is not DONE, call `finish`."""
+    """One control period with an action; gives the solver's code. Where it is not DONE, call `finish`."""
     now, before = floats(p, PLANT.action), floats(p, PLANT.before)
     for i in range(2):
         before[i] = now[i]

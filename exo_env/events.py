@@ -35,7 +35,6 @@ class Limits(Settings):
             raise ValueError(f"lowest_deg = {self.lowest_deg} must be below highest_deg = {self.highest_deg}")
         return self
 
-
     def numbers(self) -> np.ndarray:
         """For compiled code: angles [rad], tension and reaction [N]."""
         return np.array([math.radians(self.lowest_deg), math.radians(self.highest_deg), self.tension, self.reaction])

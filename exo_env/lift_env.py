@@ -40,15 +40,16 @@ class ElbowLiftEnv(gymnasium.Env):
     ## Description
     A subject with six elbow muscles wears a cable-driven elbow exoskeleton and lifts a weight on a gym machine along a
     reference (Fig. 8 of the paper, scenario 3). Bodies, joints, ropes, muscles, motors and controller are one system of
-    differential-algebraic equations that advances with its own steps; one `step` holds an action for one control period
-    (50 Hz). One episode is one repetition: rest, flexion, pause, return, of random amplitude, duration and pause, with
-    a random patient and load. The patient is to do as much as possible, the device no more than is needed: effort
-    is forgotten where the device leaves no error.
+    differential-algebraic equations that advances with its own steps; one `step` is one control period (50 Hz). Over
+    it, commands and the patient's excitations go linearly from their last values to the new ones. One episode is one
+    repetition: rest, flexion, pause, return, of random amplitude, duration and pause, with a random patient and load.
+    The patient is to do as much as possible, the device no more than is needed: effort is forgotten where the device
+    leaves no error.
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`. Numbers beyond -1 to 1 are clipped; a number that is not finite, or another shape, is
-    an error. With `action_mode="rope_tension"` (the default), an action commands tensions, which change by at most
-    2000 N/s and follow with a lag of 0.02 s:
+    an error. An action says what the commands are at the end of its control period. With `action_mode="rope_tension"`
+    (the default) these are tensions, which change by at most 2000 N/s and follow with a lag of 0.02 s:
 
     | Num | Action             | Min | Max | Control Min | Control Max | Unit |
     |-----|--------------------|-----|-----|-------------|-------------|------|
@@ -265,7 +266,7 @@ class ElbowLiftEnv(gymnasium.Env):
         return self._episode
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Hold an action over one control period.
+        """One control period, over which the commands go linearly to those of an action.
 
         Args:
             action: two numbers; beyond -1 to 1 they are clipped.
@@ -313,7 +314,7 @@ class ElbowLiftEnv(gymnasium.Env):
         """Everything of the paper's figures 9 to 13 at the present time, without noise: every sensor of the model.
 
         Beside them 'time' [s], 'reference' and 'tracking_error' [rad], 'elbow_reaction' [N], 'device_share' and
-        'effort' [-], the inputs held, counts and worst errors of the solver. Units: `reading_units()`.
+        'effort' [-], the commands reached, counts and worst errors of the solver. Units: `reading_units()`.
         """
         _ = self.episode
         return self._readout.readings()

@@ -120,7 +120,7 @@ GROUPS: dict[str, list[Channel]] = {
 _ALL = [c for channels in GROUPS.values() for c in channels]
 _STARTS = np.concatenate([[0], np.cumsum([len(c.labels) for c in _ALL])])
 TRUTH_SIZE = int(_STARTS[-1])
-TRUTH: Any = namedtuple("TRUTH", [c.name for c in _ALL])(*map(int, _STARTS[:-1]))
+TRUTH: Any = namedtuple("TRUTH", [c.name for c in _ALL])(*_STARTS[:-1].tolist())
 """Place of each channel in the vector of all."""
 DEVIATION, QUANTUM, SCALE, LOW, HIGH, WHOLE, PART = range(7)
 

@@ -51,7 +51,7 @@ class Readout:
         return self.plant.y[self._activation]
 
     def readings(self) -> dict[str, float]:
-        """Every sensor, what follows from them, the inputs held, counts and worst errors of the solver."""
+        """Every sensor, what follows from them, the commands reached, counts and worst errors of the solver."""
         e = self.episode
         found = {name: float(self.plant.y[k]) for name, k in e.names.items()}
         found |= {

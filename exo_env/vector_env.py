@@ -83,7 +83,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         mask = self._mask(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
         infos: dict[str, Any] = {}
-        for i in np.flatnonzero(mask):
+        for i in np.flatnonzero(mask).tolist():
             infos = self._add_info(infos, self._reset(i, seeds[i], options), i)
         self._started = True
         return self._batch.observations.copy(), infos
@@ -93,9 +93,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         if mask is None:
             return np.ones(self.num_envs, bool)
         if not (isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
-            raise InputError(
-                f"reset_mask = {mask!r}; {self.num_envs} booleans, one of them true, are wanted."
-            )
+            raise InputError(f"reset_mask = {mask!r}; {self.num_envs} booleans, one of them true, are wanted.")
         if not self._started and not mask.all():
             raise gymnasium.error.ResetNeeded("The first reset() has to reset all worlds.")
         return mask
@@ -158,14 +156,14 @@ class ElbowLiftVectorEnv(VectorEnv):
 
     def _autoreset(self, waiting: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
         """Begin the episodes of worlds that ended one at the step before."""
-        for i in np.flatnonzero(waiting):
+        for i in np.flatnonzero(waiting).tolist():
             infos = self._add_info(infos, self._reset(i), i)
         return infos
 
     def _same_step(self, ended: np.ndarray, told: dict[str, Any]) -> dict[str, Any]:
         """Begin the episodes of worlds that ended one now; what they ended with is in final_obs and final_info."""
         last, infos = self._batch.observations.copy(), self._infos(~ended) if not ended.all() else {}
-        for i in np.flatnonzero(ended):
+        for i in np.flatnonzero(ended).tolist():
             final = {name: told[name][i].item() for name in _PLAIN}
             final |= {group: {name: told[group][name][i].item() for name in TERMS} for group in _GROUPED}
             if "event" in told and told["_event"][i]:
@@ -194,11 +192,11 @@ class ElbowLiftVectorEnv(VectorEnv):
             "solver_failed": failed,
         }
         infos |= {f"_{name}": running.copy() for name in list(infos)}
-        for i in np.flatnonzero(running & (status[:, STATUS.event] != NOTHING)):
+        for i in np.flatnonzero(running & (status[:, STATUS.event] != NOTHING)).tolist():
             infos = self._add_info(infos, {"event": self.envs[i].happened()}, i)
         return infos
 
-    def render(self) -> tuple[np.ndarray | None, ...] | None:
+    def render(self) -> tuple[Any, ...] | None:
         """A picture of each world."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 

@@ -221,8 +221,8 @@ class Model:
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         work = self.new_work()
         work.q[: self.n_q], work.v[: self.n_q] = q, v
-        calls = tuple(Packed(x) for x in self._solved_calls())
-        w, (dynamics, constraints) = Packed(work), (x.table for x in calls)
+        dynamics, constraints = (Packed(x) for x in self._solved_calls())
+        w = Packed(work)
         evaluate_inputs(Packed(self._signals).table, t, False, w.table)
         rows, moving = [layout.row_names[k] for k in solved], [layout.names[k] for k in free]
         names = [*(f"{n} (position)" for n in moving), *(f"{n} (velocity)" for n in moving)]
@@ -232,19 +232,20 @@ class Model:
             newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
         ).best_order(self._samples(
             work, len(slots.number),
-            lambda x: evaluate_newton(dynamics, constraints, packed.table, w.table, TYPICAL_C0, x),
+            lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, TYPICAL_C0, x),
         ))  # fmt: skip
         rates, slots = rate_pattern(layout, free, solved)
         packed_rates = Packed(rates)
         rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*moving, *rows]).best_order(
             self._samples(
-                work, len(slots.number), lambda x: evaluate_rates(dynamics, constraints, packed_rates.table, w.table, x)
+                work, len(slots.number),
+                lambda x: evaluate_rates(dynamics.table, constraints.table, packed_rates.table, w.table, x),
             )
-        )
+        )  # fmt: skip
         scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
         scale_q, scale_v = np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1])
         return Tables(
-            *(x.values for x in calls), self._sensors.values, newton, newton_lu, rates, rate_lu, free, solved,
+            dynamics.values, constraints.values, self._sensors.values, newton, newton_lu, rates, rate_lu, free, solved,
             self.second_order, scale_q, scale_v, part_addresses(),
         )  # fmt: skip
 

@@ -39,6 +39,8 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
+NEAR = 32
+"""Steps to a landing from which on those of SDIRK2 are of one size; farther off the size follows the error."""
 
 
 @compiled
@@ -154,7 +156,7 @@ def resize(h, error, iterations):
 def one_step(m, s, o, stop, kept):
     """Attempts until one step is accepted; gives DONE or what went wrong. `kept`: the step is recorded."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
-    started, equal = count[RESTART] == 1 or o.one_step == 1, o.one_step == 1 and not fixed
+    started = count[RESTART] == 1 or o.one_step == 1
     set_weights(m, s, o)
     wanted = o.fixed_step if fixed else min(clock[H_WANTED], o.h_max)
     if not fixed and wanted < o.h_min:
@@ -162,6 +164,7 @@ def one_step(m, s, o, stop, kept):
     if not started and not fixed:
         wanted = min(wanted, GROW * clock[H_BEFORE])
     rest = stop - clock[T]
+    equal = o.one_step == 1 and not fixed and rest <= NEAR * wanted
     first_try = True
     while True:
         h = landing_size(wanted, rest, fixed, equal)

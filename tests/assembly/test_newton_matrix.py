@@ -51,7 +51,9 @@ class Stage:
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Scaled residual (r1 / c0, r2 / c0^2, r3, r4 / c0) at the present state plus the scaled correction x."""
         apply(self.m, self.s, self.c0, x, 1.0)
-        evaluate_residual(inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w), False)
+        evaluate_residual(
+            inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w), False
+        )
         right_hand_side(self.m, self.s, self.c0)
         apply(self.m, self.s, self.c0, x, -1.0)
         return -self.simulation.state.b

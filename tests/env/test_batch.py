@@ -19,7 +19,7 @@ def _same(a, b, where=""):
     for name in a:
         if isinstance(a[name], dict):
             _same(a[name], b[name], f"{where}.{name}")
-        elif getattr(a[name], "dtype", None) == object:
+        elif getattr(a[name], "dtype", None) == np.dtype(object):
             mask = np.array([x is not None for x in b[name]])
             for x, y in zip(a[name][mask], b[name][mask], strict=True):
                 np.testing.assert_array_equal(x, y, err_msg=f"{where}.{name}")

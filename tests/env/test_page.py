@@ -3,7 +3,6 @@
 import inspect
 import re
 
-import numpy as np
 import pytest
 
 from exo_env.actions import PidSetpoint, RopeTension
