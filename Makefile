@@ -8,14 +8,17 @@ BIN := .venv/bin
 STAMP := .venv/installed
 # With the training libraries, which the tests need beside the rest; torch is large, the demo does without it.
 TRAIN_STAMP := .venv/installed-train
+# With all extras: ONNX and Ray, without which tests of export and sweeps are skipped.
+ALL_STAMP := .venv/installed-all
 # The lower bound in pyproject.toml.
 OLDEST_GYMNASIUM := 1.2.0
 
-.PHONY: help demo test test-oldest bench lint format docs clean
+.PHONY: help demo test test-slow test-oldest bench lint format docs clean
 
 help:
 	@echo "make demo   the paper's four scenarios, then baselines and the learned policy: figures, tables, video, into $(OUT)"
 	@echo "make test   the tests"
+	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
 	@echo "make bench  speed, as a table"
 	@echo "make lint   ruff and mypy"
@@ -35,6 +38,11 @@ $(TRAIN_STAMP): $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[pictures,dev,train]"
 	@touch $@
 
+$(ALL_STAMP): $(TRAIN_STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
+	    -e ".[pictures,dev,train,export,sweep]"
+	@touch $@
+
 demo: $(STAMP)
 	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
 	$(BIN)/python -m agents evaluate --policy none pid pid_yielding pid_compensated assist_as_needed learned \
@@ -44,7 +52,11 @@ demo: $(STAMP)
 	@echo "Figures and tables: $(abspath $(OUT))/scenarios and $(abspath $(OUT))/report; video: $(abspath $(OUT))/assist.mp4"
 
 test: $(TRAIN_STAMP)
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"
+
+test-slow: $(ALL_STAMP)
+	$(BIN)/python -m pytest -n $(WORKERS) -m slow
+	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow" tests/agents/test_export.py tests/agents/test_sweep.py
 
 test-oldest: $(TRAIN_STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv/oldest \

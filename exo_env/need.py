@@ -80,4 +80,6 @@ class Need:
         needed = np.zeros(len(course))
         needed_moments(arm, load, course, needed)
         needed = np.maximum(needed, 0.0)
-        return cls(able, (1.0 - able) * needed + device.own_moment(course[:, 0], g), max(float(needed.mean()), SMALLEST_SCALE))
+        return cls(
+            able, (1.0 - able) * needed + device.own_moment(course[:, 0], g), max(float(needed.mean()), SMALLEST_SCALE)
+        )

@@ -103,35 +103,40 @@ def blow(k: int) -> tuple:
     return LumpedLoad(name=f"blow{k}", body=body, point=(0.02, 0.05, 0.1), force=(30.0, -20.0, 10.0), input="size")
 
 
+def beaten(*more) -> System:
+    """The arm under blows that jump."""
+    size = Input(name="size", signal=Steps(times=(0.0, 0.05, 0.2), values=(0.0, 1.0, -0.5)))
+    return arm(extra=(blow(0), blow(1), *more), inputs=(size,))
+
+
 CASES = {
     "ecosystem": ecosystem,
-    "arm": lambda: arm(
-        extra=(blow(0), blow(1)),
-        inputs=(Input(name="size", signal=Steps(times=(0.0, 0.05, 0.2), values=(0.0, 1.0, -0.5))),),
-    ),
+    "arm": beaten,
+    # Held twice: six rows are redundant, and multipliers those of least norm.
+    "braced arm": lambda: beaten(Fixed(name="brace", body_j="humerus")),
 }
 
 
 @pytest.mark.parametrize("method", ["bdf2", "sdirk2"])
 @pytest.mark.parametrize("case", CASES)
 def test_the_run_is_that_of_the_whole_system(case, method):
-    system, options = CASES[case](), SolverOptions(rtol=1e-7, method=method)
+    system, options = CASES[case](), SolverOptions(rtol=1e-6, method=method)
     model, whole = Model(system), solved_whole(system)
     assert len(model.welds.rows) and not len(whole.welds.rows)
-    one, other = (simulate(m, 0.3, options).check() for m in (model, whole))
+    one, other = (simulate(m, 0.25, options).check() for m in (model, whole))
     # What does not move does not move at all.
     assert np.ptp(one.q[:, model.welds.coordinates], axis=0).max() == 0.0
     assert np.abs(one.v[:, model.welds.coordinates]).max() == 0.0
-    times = np.linspace(0.0, 0.3, 61)
+    times = np.linspace(0.0, 0.25, 51)
     one, other = one.at(times), other.at(times)
     by_q, by_v = np.array([(c.scale, c.rate_scale) for c in model.layout.coordinates]).T
-    # Both leave up to 5e-10 of the scales to Newton's method (0.05 of a tenth of rtol); 1e-10 is found, also in forces.
-    np.testing.assert_allclose(one.q / by_q, other.q / by_q, atol=1e-9)
-    np.testing.assert_allclose(one.v / by_v, other.v / by_v, atol=1e-9)
+    # Both leave up to 5e-9 of the scales to Newton's method (0.05 of a tenth of rtol); 1e-9 is found, also in forces.
+    np.testing.assert_allclose(one.q / by_q, other.q / by_q, atol=1e-8)
+    np.testing.assert_allclose(one.v / by_v, other.v / by_v, atol=1e-8)
     assert np.ptp(other.q / by_q, axis=0).max() > 1e-2, "nothing moved"
     welded, size = model.welds.rows, np.abs(other.lam).max()
     assert np.abs(other.lam[:, welded]).max() > 100.0, "nothing pulls on the welds"
-    np.testing.assert_allclose(one.lam, other.lam, atol=1e-9 * size)
+    np.testing.assert_allclose(one.lam, other.lam, atol=1e-8 * size)
 
 
 def reactions(frame: str) -> list[JointReaction]:

@@ -1,6 +1,6 @@
 """Control periods of exo/ElbowLift-v0 per second at 50 Hz, resets included, as ratios to MyoSuite's exoskeleton elbow.
 
-    python tests/benchmarks/env_speed.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/env_speed.py
 
 A single environment in CPU seconds of one thread; a batch in wall seconds, for which the machine has to be quiet. Both
 are scaled by calibration.py. MyoSuite's myoElbowPose1D6MExoRandom-v0 (MuJoCo, no constraint loops, no PID, 0.03 rad
@@ -10,14 +10,11 @@ the same calibration on a shared two-core machine.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
 
 import numpy as np
 
@@ -90,7 +87,9 @@ def batch(mode: str, rough: bool, threads: int) -> None:
 def main() -> None:
     """Print two tables."""
     print("one environment; ratio to MyoSuite")
-    print(f"{'mode':14} {'actions':7} {'steps/s':>8} {'ratio':>6} {'resets':>7} {'reset ms':>9} {'99.9 % / median':>18}")
+    print(
+        f"{'mode':14} {'actions':7} {'steps/s':>8} {'ratio':>6} {'resets':>7} {'reset ms':>9} {'99.9 % / median':>18}"
+    )
     for mode in MODES:
         for rough in (True, False):
             single(mode, rough)

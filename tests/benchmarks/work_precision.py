@@ -2,9 +2,9 @@
 
     python tests/benchmarks/work_precision.py [--out docs]
 
-Ours: CPU time of one thread, scaled by calibration.py, and the error at the end time or, of the elbow angle, the largest
-over time, against a run at a hundredth of the finest tolerance. Others: peers.csv, measured on another day with the same
-calibration. Their systems are not the same in every detail; peers.csv says what each is.
+Ours: CPU time of one thread, scaled by calibration.py, and the error at the end time or, of the elbow angle, the
+largest over time, against a run at a hundredth of the finest tolerance. Others: peers.csv, measured on another day with
+the same calibration. Their systems are not the same in every detail; peers.csv says what each is.
 """
 
 from __future__ import annotations

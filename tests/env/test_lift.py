@@ -260,8 +260,18 @@ def test_default_tolerance_is_finer_than_the_encoder():
     np.testing.assert_allclose(angles[0], angles[1], atol=3e-4)
 
 
+def test_compiled_readings_are_those_of_the_world(env):
+    """A control period reads its sensors in compiled code, which recovers no reactions of welded joints."""
+    env.reset(seed=4)
+    for _ in range(3):
+        env.step(np.array([0.2, -0.5]))
+    found, wanted = env.readings(), env.episode.world.read()
+    for (name, _), value in zip(env.episode.model.layout.outputs, wanted, strict=True):
+        assert found[name] == value, name
+
+
 def test_a_slow_iteration_renews_its_matrix():
-    """At this tolerance fibres stop shortening between guess and solution, and an old test of slowness gave up there."""
+    """Here fibres stop shortening between guess and solution, and an earlier test of slowness gave up."""
     env = ElbowLiftEnv(action_mode="pid_setpoint", noise=False, rtol=0.1)
     env.reset(seed=0)
     for k in range(20):
