@@ -25,7 +25,7 @@ from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
 from agents.export import export
 from agents.figure import draw, require_matplotlib
-from agents.learned import find_policy
+from agents.learned import find_policy, shipped_policies
 from agents.report import report
 from agents.sweep import sweep
 from agents.train_command import train
@@ -91,6 +91,9 @@ def policies() -> int:
     """List the policies that `evaluate` knows."""
     for name, kind in POLICIES.items():
         print(f"{name:18} {kind.title}; action mode {kind.action_mode}, sees {', '.join(kind.observation)}")
+    for name in shipped_policies():
+        one = find_policy(name)
+        print(f"{name:18} {one.title}; action mode {one.action_mode}, sees {', '.join(one.observation)}")
     return 0
 
 
