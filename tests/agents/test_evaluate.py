@@ -9,6 +9,7 @@ import pytest
 from agents.__main__ import main
 from agents.baselines import POLICIES, policy
 from agents.evaluate import by_patient, evaluate, patient_seeds, table
+from agents.learned import shipped_policies
 from agents.measures import MEASURES
 from agents.statistics import interquartile_mean
 
@@ -95,7 +96,7 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
 
 def test_policies_lists_all(capsys):
     assert main(["policies"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(POLICIES)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [*POLICIES, *shipped_policies()]
 
 
 def test_loads_are_lifted_by_every_patient_and_averaged():
