@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from agents.evaluate import patient_seeds
 from dms_core.output_file import check_writable, whole_file
+from exo_env.actions import PidSetpoint
 from exo_env.control_period import READING
 from exo_env.vector_env import ElbowLiftVectorEnv
 
@@ -45,7 +46,7 @@ def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> dict[s
     returns, square, works, alive = np.zeros(TRIES), np.zeros(TRIES), np.zeros((2, TRIES)), np.ones(TRIES, bool)
     for time in episode.times[:-1]:
         authority, lag = tried[:, 0:2].T if time < up else tried[:, 2:4].T
-        actions = np.stack([-np.radians(lag) / worlds.envs[0].drive.setpoint_range, 2.0 * authority - 1.0], axis=1)
+        actions = np.stack([-np.radians(lag) / PidSetpoint().setpoint_range, 2.0 * authority - 1.0], axis=1)
         _, rewards, terminated, _, told = worlds.step(actions)
         returns += np.where(alive, rewards, 0.0)
         square += told["tracking_error_deg"] ** 2
