@@ -1,7 +1,7 @@
 # Two commands for a stranger: `make demo` and `make test`. Needs Python 3.11 or later, make and pip; no root.
 # PYTHON chooses the interpreter of a new .venv:  make demo PYTHON=python3.12
 PYTHON ?= python3
-OUT ?= out/scenarios
+OUT ?= out
 WORKERS ?= 2
 
 BIN := .venv/bin
@@ -16,7 +16,7 @@ OLDEST_GYMNASIUM := 1.2.0
 .PHONY: help demo test test-slow test-oldest bench lint format docs clean
 
 help:
-	@echo "make demo   the four scenarios of the paper, with figures, into $(OUT)"
+	@echo "make demo   the paper's four scenarios, then baselines and the learned policy: figures, tables, video, into $(OUT)"
 	@echo "make test   the tests"
 	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
@@ -44,8 +44,12 @@ $(ALL_STAMP): $(TRAIN_STAMP)
 	@touch $@
 
 demo: $(STAMP)
-	$(BIN)/python -m exo_env scenarios --out $(OUT)
-	@echo "Figures, tables and scenarios.json are in $(abspath $(OUT))"
+	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
+	$(BIN)/python -m agents evaluate --policy none pid pid_yielding pid_compensated assist_as_needed learned \
+	    --patients 20 --out $(OUT)/evaluation
+	$(BIN)/python -m agents report $(OUT)/evaluation --policies pid learned --out $(OUT)/report
+	$(BIN)/python -m agents video --policy pid learned --patient stroke_severe --out $(OUT)/assist.mp4
+	@echo "Figures and tables: $(abspath $(OUT))/scenarios and $(abspath $(OUT))/report; video: $(abspath $(OUT))/assist.mp4"
 
 test: $(TRAIN_STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"
@@ -61,6 +65,8 @@ test-oldest: $(TRAIN_STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python tests/benchmarks/bench.py
+	$(BIN)/python tests/benchmarks/env_speed.py
+	$(BIN)/python tests/benchmarks/work_precision.py --out $(OUT)/bench
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -73,8 +79,8 @@ format: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python -m dms_core schema --out docs/model-files.md
-	$(BIN)/python -m exo_env scenarios --out $(OUT)
-	cp $(OUT)/fig12_joint_moments.png docs/scenarios.png
+	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
+	cp $(OUT)/scenarios/fig12_joint_moments.png docs/scenarios.png
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -25,7 +25,7 @@ from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
 from agents.export import export
 from agents.figure import draw, require_matplotlib
-from agents.learned import find_policy
+from agents.learned import find_policy, shipped_policies
 from agents.report import report
 from agents.sweep import sweep
 from agents.train_command import train
@@ -43,6 +43,7 @@ def evaluate(
     population: str = "evaluation",
     patients: int = 20,
     seed: int = 0,
+    loads: tuple[float, ...] = (),
     workers: Literal["here", "ray"] = "here",
     address: str | None = None,
 ) -> int:
@@ -52,8 +53,9 @@ def evaluate(
         policy_names: one or more, see `python -m agents policies`, or folders of trained ones.
         out: folder for the results; made where it is missing.
         population: of the patients, by name or YAML file.
-        patients: how many; one episode each.
+        patients: how many; one episode each, or one a load.
         seed: of the patients and of the bootstrap.
+        loads: that each patient lifts [kg]; one drawn for each patient where none is given.
         workers: 'ray' shares the episodes out, with the same results to the last bit.
         address: of a Ray cluster; a local one is started where it is not given.
     """
@@ -63,7 +65,9 @@ def evaluate(
     find_population(population)
     require_matplotlib()
     check_writable(out / "evaluation.json")
-    with tqdm(total=len(used) * max(patients, 0), unit="episode", leave=False, disable=None) as bar:
+    with tqdm(
+        total=len(used) * max(patients, 0) * max(len(loads), 1), unit="episode", leave=False, disable=None
+    ) as bar:
 
         def progress(name: str) -> None:
             bar.set_description(name)
@@ -72,9 +76,9 @@ def evaluate(
         if workers == "ray":
             from agents.shared_evaluation import evaluate_by_ray
 
-            results = evaluate_by_ray(used, population, patients, seed, address=address, progress=progress)
+            results = evaluate_by_ray(used, population, patients, seed, loads=loads, address=address, progress=progress)
         else:
-            results = run_all(used, population, patients, seed, progress=progress)
+            results = run_all(used, population, patients, seed, loads=loads, progress=progress)
     write_json(out / "evaluation.json", _json(results))
     draw(out / "evaluation.png", results)
     print(f"{patients} patients of '{population}', seed {seed}: interquartile mean [95 % bootstrap interval]")
@@ -87,6 +91,9 @@ def policies() -> int:
     """List the policies that `evaluate` knows."""
     for name, kind in POLICIES.items():
         print(f"{name:18} {kind.title}; action mode {kind.action_mode}, sees {', '.join(kind.observation)}")
+    for name in shipped_policies():
+        one = find_policy(name)
+        print(f"{name:18} {one.title}; action mode {one.action_mode}, sees {', '.join(one.observation)}")
     return 0
 
 

@@ -2,7 +2,8 @@
 
 Arguments are checked against the algorithm's own signature, so that a misspelt key or a text where a number belongs is
 found before anything runs. What would need code in a configuration (classes, noise objects) cannot be given, nor
-state-dependent exploration, whose policies the exported form does not describe.
+state-dependent exploration (use_sde) for algorithms whose policies it changes, so that the exported form no longer
+describes them: of PPO it changes the noise only.
 """
 
 from __future__ import annotations
@@ -30,10 +31,11 @@ ACTIVATIONS: dict[str, type[nn.Module]] = {
 NOT_GIVEN = (
     "self", "env", "policy", "tensorboard_log", "verbose", "seed", "device", "_init_setup_model", "action_noise",
     "optimize_memory_usage", "observation_space", "action_space", "lr_schedule", "full_std", "use_expln",
-    "squash_output", "share_features_extractor", "normalize_images", "clip_mean", "use_sde_at_warmup", "use_sde",
-    "sde_sample_freq", "rollout_buffer_kwargs", "replay_buffer_kwargs", "features_extractor_kwargs",
+    "squash_output", "share_features_extractor", "normalize_images", "clip_mean", "use_sde_at_warmup",
+    "rollout_buffer_kwargs", "replay_buffer_kwargs", "features_extractor_kwargs",
     "optimizer_kwargs", "lstm_kwargs",
 )  # fmt: skip
+STATE_DEPENDENT = {"use_sde", "sde_sample_freq"}
 SCHEDULE = re.compile(r"lin_[0-9.]+(?:[eE][-+]?[0-9]+)?")
 """A value that falls linearly from this one to 0 at the end of the training."""
 
@@ -75,7 +77,8 @@ def policies(name: str) -> list[str]:
 def allowed(taker: Callable[..., Any]) -> dict[str, Any]:
     """Keys that may be given, with their types."""
     taken = inspect.signature(taker).parameters.values()
-    return {p.name: p.annotation for p in taken if p.name not in NOT_GIVEN and not p.name.endswith("_class")}
+    refused = {*NOT_GIVEN, *(STATE_DEPENDENT if taker in (SAC, TQC) else ())}
+    return {p.name: p.annotation for p in taken if p.name not in refused and not p.name.endswith("_class")}
 
 
 def activation(name: str) -> type[nn.Module]:

@@ -1,4 +1,9 @@
-"""Policies on the same patients: every episode measured, every measure with its interval."""
+"""Policies on the same patients: every episode measured, every measure with its interval.
+
+A patient may lift several loads. A patient's episodes are no independent sample, so they are averaged before anything
+is estimated: intervals tell how much other patients would change the numbers. Between two policies on the same patients
+the difference is known better than either (`differences`).
+"""
 
 from __future__ import annotations
 
@@ -20,11 +25,20 @@ from exo_env.repetition import Repetition
 ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
 OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
 """Measures that are printed of them."""
+COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
+"""Measures whose differences to the first policy are estimated, patient by patient."""
+Case = tuple[int, float | None]
+"""Seed of an episode and its load [kg], None for the one that the seed draws."""
 
 
 def patient_seeds(seed: int, patients: int) -> list[int]:
     """Seeds of the episodes; more patients keep those of fewer."""
     return [int(x) for x in np.random.SeedSequence(seed).generate_state(patients)]
+
+
+def cases_of(seed: int, patients: int, loads: Sequence[float] = ()) -> list[Case]:
+    """Every patient with every load."""
+    return [(one, load) for one in patient_seeds(seed, patients) for load in (loads or (None,))]
 
 
 def evaluate(
@@ -33,6 +47,7 @@ def evaluate(
     patients: int,
     seed: int,
     *,
+    loads: Sequence[float] = (),
     progress: Callable[[str], None] | None = None,
     **settings: Any,
 ) -> dict[str, Any]:
@@ -41,8 +56,9 @@ def evaluate(
     Args:
         policies: to compare.
         patients_of: population by name, YAML file, or what else `patient` of the environment takes.
-        patients: how many; one episode each.
+        patients: how many; one episode each, or one a load.
         seed: of the patients and of the bootstrap.
+        loads: that each patient lifts [kg]; one that the seed draws, where none is given.
         progress: called with the name of the policy after each episode.
         settings: further ones of the environment.
 
@@ -54,8 +70,8 @@ def evaluate(
         InputError: the population is unknown, or a number is not usable.
     """
     check_numbers(patients, seed)
-    source, seeds = population(patients_of), patient_seeds(seed, patients)
-    episodes = [episodes_of(one, source.model_dump(), seeds, settings, progress) for one in policies]
+    source, cases = population(patients_of), cases_of(seed, patients, loads)
+    episodes = [episodes_of(one, source.model_dump(), cases, settings, progress) for one in policies]
     return results_of(policies, episodes, source.title, patients, seed)
 
 
@@ -73,18 +89,18 @@ def check_numbers(patients: int, seed: int) -> None:
 def episodes_of(
     one: Policy,
     patient: dict[str, Any],
-    seeds: Sequence[int],
+    cases: Sequence[Case],
     settings: dict[str, Any],
     progress: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Episodes of a policy, one a seed."""
+    """Episodes of a policy, one a case."""
     env = gymnasium.make(
         ENVIRONMENT, disable_env_checker=True, patient=patient, action_mode=one.action_mode,
         observation=list(one.observation), **settings,
     )  # fmt: skip
     found = []
-    for number in seeds:
-        found.append({"seed": number, **episode(env, one, number)})
+    for number, load in cases:
+        found.append({"seed": number, **episode(env, one, number, load)})
         if progress is not None:
             progress(one.name)
     env.close()
@@ -100,7 +116,7 @@ def results_of(
         able = [e for e in those if e["ability"] >= ABLE]
         found[one.name] = {
             "title": one.title, "summary": summary(those, seed), "summary_able": summary(able, seed),
-            "episodes": those,
+            "difference": differences(those, episodes[0], seed), "episodes": those,
         }  # fmt: skip
     return {
         "population": title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
@@ -108,10 +124,10 @@ def results_of(
     }  # fmt: skip
 
 
-def episode(env: gymnasium.Env, acting: Policy, seed: int) -> dict[str, Any]:
-    """Measures of one episode, with load, repetition and what ended it."""
+def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> dict[str, Any]:
+    """Measures of one episode, with load, repetition and what ended it; `load` [kg] in place of the one drawn."""
     world: Any = env.unwrapped
-    observation, drawn = env.reset(seed=seed)
+    observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
     info = drawn
     acting.reset(env)
     record = Record(Repetition(**drawn["reference"]), world.period)
@@ -131,12 +147,29 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int) -> dict[str, Any]:
 
 
 def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, float]]:
-    """Estimate of each measure over the episodes, by name."""
+    """Estimate of each measure over the patients, by name."""
     found = {}
     for m in MEASURES:
-        values = np.array([e["measures"][m.name] for e in episodes])
+        values = by_patient(episodes, m.name)
         # A generator for each measure and not for each policy: the same resamples for all policies.
         found[m.name] = asdict(estimate(values, mean if m.rate else interquartile_mean, np.random.default_rng(seed)))
+    return found
+
+
+def by_patient(episodes: list[dict[str, Any]], measure: str) -> np.ndarray:
+    """Mean of a measure over the episodes of each patient, shape (n,); NaN where it could not be measured."""
+    values: dict[int, list[float]] = {}
+    for e in episodes:
+        values.setdefault(e["seed"], []).append(e["measures"][measure])
+    return np.array([np.mean([x for x in v if np.isfinite(x)] or [np.nan]) for v in values.values()])
+
+
+def differences(episodes: list[dict[str, Any]], others: list[dict[str, Any]], seed: int) -> dict[str, dict[str, float]]:
+    """Estimates of the mean difference to the first policy, patient by patient."""
+    found = {}
+    for name in COMPARED:
+        values = by_patient(episodes, name) - by_patient(others, name)
+        found[name] = asdict(estimate(values, mean, np.random.default_rng(seed)))
     return found
 
 
@@ -162,10 +195,12 @@ def _rows(results: dict[str, Any], summary: str, measures: Sequence[str]) -> lis
 def table_rows(results: dict[str, Any]) -> list[list[str]]:
     """Cells of the table, the first row its head."""
     names = list(results["policies"])
-    count = sum(e["ability"] >= results["able"] for e in results["policies"][names[0]]["episodes"])
+    count = len({e["seed"] for e in results["policies"][names[0]]["episodes"] if e["ability"] >= results["able"]})
     rows = [["", *names], *_rows(results, "summary", [m.name for m in MEASURES])]
     rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
-    return rows + _rows(results, "summary_able", OF_THE_ABLE)
+    rows += _rows(results, "summary_able", OF_THE_ABLE)
+    rows += [[f"mean difference to {names[0]}, patient by patient", *("" for _ in names)]]
+    return rows + _rows(results, "difference", COMPARED)
 
 
 def _cell(e: Estimate) -> str:

@@ -21,10 +21,12 @@ from agents.config import ENVIRONMENT_ID
 from agents.network import Architecture, Network
 from agents.policy import Policy
 from agents.tensors import from_bytes, to_bytes
+from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from exo_env.settings import Settings
 
 DESCRIPTION, WEIGHTS, FORMAT = "policy.json", "weights.safetensors", 1
+SHIPPED = configs() / "policies"
 COMPARED = ("group", "name", "start", "stop", "unit", "scale")
 """Of a part of the observation, what has to be as in training."""
 
@@ -139,13 +141,15 @@ class LearnedPolicy(Policy):
 
 
 def find_policy(name: str) -> Policy:
-    """A baseline by name, or a trained policy by its folder or the folder of its training.
+    """A baseline or a shipped policy by name, or a trained one by its folder or the folder of its training.
 
     Raises:
         InputError: there is neither.
     """
     if name in POLICIES:
         return baseline(name)
+    if name in shipped_policies():
+        return LearnedPolicy.load(SHIPPED / name, name)
     folder = Path(name)
     if (folder / DESCRIPTION).is_file():
         return LearnedPolicy.load(folder, name)
@@ -155,4 +159,10 @@ def find_policy(name: str) -> Policy:
         return LearnedPolicy.load(Store(folder / "best").latest(), name)
     if folder.is_dir() or "/" in name:
         raise InputError(f"policy '{name}': there is no {DESCRIPTION} in this folder.")
-    raise InputError(f"unknown policy '{name}'. There are: {choices(POLICIES)}, and folders of trained policies.")
+    known = [*POLICIES, *shipped_policies()]
+    raise InputError(f"unknown policy '{name}'. There are: {choices(known)}, and folders of trained policies.")
+
+
+def shipped_policies() -> list[str]:
+    """Names of the trained policies that come with this project."""
+    return sorted(p.parent.name for p in SHIPPED.glob(f"*/{DESCRIPTION}"))

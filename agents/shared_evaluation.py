@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from agents.cluster import share_out
-from agents.evaluate import check_numbers, episodes_of, patient_seeds, results_of
+from agents.evaluate import cases_of, check_numbers, episodes_of, results_of
 from agents.policy import Policy
 from exo_env.population import Source, population
 
@@ -20,6 +20,7 @@ def evaluate_by_ray(
     patients: int,
     seed: int,
     *,
+    loads: Sequence[float] = (),
     address: str | None = None,
     cpus: int | None = None,
     progress: Callable[[str], None] | None = None,
@@ -27,8 +28,8 @@ def evaluate_by_ray(
 ) -> dict[str, Any]:
     """As `evaluate`; `address` and `cpus` as in `share_out`."""
     check_numbers(patients, seed)
-    source, seeds = population(patients_of), patient_seeds(seed, patients)
-    parts = [seeds[k : k + LARGEST_SHARE] for k in range(0, patients, LARGEST_SHARE)]
+    source, cases = population(patients_of), cases_of(seed, patients, loads)
+    parts = [cases[k : k + LARGEST_SHARE] for k in range(0, len(cases), LARGEST_SHARE)]
     shares = [(one, source.model_dump(), part, settings) for one in policies for part in parts]
 
     def done(k: int) -> None:

@@ -87,7 +87,7 @@ class PidSetpoint(Settings):
     """Drive of action mode 'pid_setpoint'."""
 
     names: ClassVar[tuple[str, str]] = ("setpoint change", "authority")
-    rtol: ClassVar[float] = 0.1
+    rtol: ClassVar[float] = 0.2
     """As above; what is left over is in the motors' tensions, and the controller keeps it from the elbow."""
     inputs: ClassVar[tuple[str, str]] = (SETPOINT, ASSISTANCE)
     setpoint_range: float = Field(default=0.2, gt=0.0, le=1.0, description="largest setpoint change [rad]; assumed")

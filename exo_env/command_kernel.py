@@ -119,6 +119,13 @@ def needed_moment(arm, load, angle, rate, acceleration):
 
 
 @compiled
+def needed_moments(arm, load, course, moment):
+    """moment[k] of psi, its rate and its acceleration in course[k] [Nm]."""
+    for k in range(course.shape[0]):
+        moment[k] = needed_moment(arm, load, course[k, 0], course[k, 1], course[k, 2])
+
+
+@compiled
 def tendon_length(par, force):
     """Length of the tendon that carries a force [m]: the inverse of the tendon curve."""
     f, e_toe, k_lin = force / par[0], par[10], par[11]
@@ -243,8 +250,8 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
     n, m = activations.shape
     lengths, levers, tendon_force = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m))
     work, moments, fibre = np.zeros((2, n, m)), np.zeros((2, m)), np.zeros(n)
+    needed_moments(arm, load, course, moment)
     for k in range(n):
-        moment[k] = needed_moment(arm, load, course[k, 0], course[k, 1], course[k, 2])
         for i in range(m):
             lengths[k, i], levers[k, i] = path_geometry(arm, i, course[k, 0])
             activations[k, i] = MINIMUM

@@ -9,7 +9,7 @@ point slides in the plane. With a line or a slider instead, rows are redundant a
 from __future__ import annotations
 
 from math import radians
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -108,10 +108,10 @@ class Exoskeleton(Settings):
         d = lower - np.array(ends.upper)
         return float(d[0] * lower[1] - d[1] * lower[0]) / float(np.linalg.norm(d))
 
-    def own_moment(self, angle: float, gravity: float) -> float:
-        """Moment that holds the lower link at a hinge angle [rad] [Nm]; gravity in m/s^2."""
+    def own_moment(self, angle: Any, gravity: float) -> Any:
+        """Moment that holds the lower link at a hinge angle, or at several [rad] [Nm]; gravity in m/s^2."""
         x, y, _ = self.lower_link.centre_of_mass
-        return float(self.lower_link.mass * gravity * (x * np.cos(angle) - y * np.sin(angle)))
+        return self.lower_link.mass * gravity * (x * np.cos(angle) - y * np.sin(angle))
 
 
 def link_axes(arm: Arm) -> np.ndarray:

@@ -215,6 +215,18 @@ class Arm:
 
     def muscle(self, name: str, **more: Any) -> ThelenMuscle:
         """A muscle of the person; `more` are further fields of ThelenMuscle, or others in place of these."""
+        if more:
+            return self._muscle(name, more)
+        if name not in self._muscles:
+            self._muscles[name] = self._muscle(name, {})
+        return self._muscles[name]
+
+    @cached_property
+    def _muscles(self) -> dict[str, ThelenMuscle]:
+        """Those asked for so far, as they are."""
+        return {}
+
+    def _muscle(self, name: str, more: dict[str, Any]) -> ThelenMuscle:
         facts = {**self.facts["muscle_defaults"], **self.facts["muscles"][name]}
         k = self._path_factors[name]
         size = self.person.strength * self.person.body_mass / MASS_0 * HEIGHT_0 / self.person.height

@@ -292,6 +292,11 @@ class ElbowLiftEnv(gymnasium.Env):
         """The packed Plant of the present episode, for a batch."""
         return self._packed.table
 
+    @property
+    def table_values(self) -> Plant:
+        """Its arrays, for who looks at many worlds; they change with every step."""
+        return self._plant
+
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
         episode, world = self.episode, self.episode.world

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.command_kernel import needed_moment
+from exo_env.command_kernel import needed_moments
 from exo_env.exoskeleton import Exoskeleton
 from exo_env.human import FLEXORS, MUSCLES
 from exo_env.motor_command import InternalModel
@@ -77,6 +77,9 @@ class Need:
         """
         arm, load, able = known.arm_table(), known.load_table(), ability(patient, known)
         g = float(np.linalg.norm(known.arm.gravity))
-        needed = np.array([max(needed_moment(arm, load, *row), 0.0) for row in course])
-        own = np.array([device.own_moment(angle, g) for angle in course[:, 0]])
-        return cls(able, (1.0 - able) * needed + own, max(float(needed.mean()), SMALLEST_SCALE))
+        needed = np.zeros(len(course))
+        needed_moments(arm, load, course, needed)
+        needed = np.maximum(needed, 0.0)
+        return cls(
+            able, (1.0 - able) * needed + device.own_moment(course[:, 0], g), max(float(needed.mean()), SMALLEST_SCALE)
+        )

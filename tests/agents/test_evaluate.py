@@ -8,7 +8,8 @@ import pytest
 
 from agents.__main__ import main
 from agents.baselines import POLICIES, policy
-from agents.evaluate import evaluate, patient_seeds, table
+from agents.evaluate import by_patient, evaluate, patient_seeds, table
+from agents.learned import shipped_policies
 from agents.measures import MEASURES
 from agents.statistics import interquartile_mean
 
@@ -34,7 +35,7 @@ def test_every_policy_meets_the_same_patients():
 
 
 def test_who_can_do_something_is_summed_up_apart():
-    weak = {"base": "stroke_severe", "fields": {"maximum_activation_flexors": {"uniform": [0.0, 0.1]}}}
+    weak = {"base": "stroke_severe", "fields": {"maximum_activation_flexors": {"uniform": [0.0, 0.15]}}}
     found = evaluate([policy("none"), policy("pid")], weak, 6, 2, **SHORT)
     for one in found["policies"].values():
         able = [e["measures"]["return"] for e in one["episodes"] if e["ability"] >= 0.2]
@@ -46,7 +47,8 @@ def test_who_can_do_something_is_summed_up_apart():
 
 def test_order_of_policies_does_not_matter():
     one, other = run(["none", "pid"], patients=1), run(["pid", "none"], patients=1)
-    assert one["policies"]["pid"] == other["policies"]["pid"]
+    for part in ("episodes", "summary", "summary_able"):
+        assert one["policies"]["pid"][part] == other["policies"]["pid"][part]
 
 
 def test_more_patients_keep_the_first():
@@ -94,4 +96,18 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
 
 def test_policies_lists_all(capsys):
     assert main(["policies"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(POLICIES)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [*POLICIES, *shipped_policies()]
+
+
+def test_loads_are_lifted_by_every_patient_and_averaged():
+    found = evaluate([policy("none"), policy("pid")], "stroke_mild", 2, 3, loads=(0.6, 1.4), **SHORT)
+    one, other = (found["policies"][name] for name in ("none", "pid"))
+    assert [e["load"] for e in one["episodes"]] == [0.6, 1.4, 0.6, 1.4]
+    assert one["episodes"][0]["patient"] == one["episodes"][1]["patient"] != one["episodes"][2]["patient"]
+    values = [e["measures"]["return"] for e in one["episodes"]]
+    means = [(values[0] + values[1]) / 2, (values[2] + values[3]) / 2]
+    np.testing.assert_allclose(by_patient(one["episodes"], "return"), means)
+    assert one["summary"]["return"]["count"] == 2
+    wanted = np.mean(by_patient(other["episodes"], "return") - means)
+    assert other["difference"]["return"]["value"] == pytest.approx(wanted)
+    assert one["difference"]["return"]["value"] == 0.0
