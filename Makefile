@@ -8,7 +8,7 @@ BIN := .venv/bin
 STAMP := .venv/installed
 # With the training libraries, which the tests need beside the rest; torch is large, the demo does without it.
 TRAIN_STAMP := .venv/installed-train
-# With all extras: ONNX and Ray, without which tests of export and sweeps are skipped.
+# With all extras, and the readers that exported policies are checked with; without them those tests are skipped.
 ALL_STAMP := .venv/installed-all
 # The lower bound in pyproject.toml.
 OLDEST_GYMNASIUM := 1.2.0
@@ -40,7 +40,7 @@ $(TRAIN_STAMP): $(STAMP)
 
 $(ALL_STAMP): $(TRAIN_STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
-	    -e ".[pictures,dev,train,export,sweep]"
+	    -e ".[pictures,dev,train,export,sweep]" onnxruntime safetensors
 	@touch $@
 
 demo: $(STAMP)
