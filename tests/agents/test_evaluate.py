@@ -69,7 +69,7 @@ def test_shares_of_work_sum_to_one_and_measures_are_complete():
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (["--policy", "nobody"], "unknown policy 'nobody'. There are: assist_as_needed, none, pid"),
+        (["--policy", "nobody"], "unknown policy 'nobody'. There are: assist_as_needed, learned, none, pid"),
         (["--policy", "none", "none"], "different"),
         (["--policy", "none", "--population", "martians"], "unknown population 'martians'"),
         (["--policy", "none", "--patients", "0"], "patients = 0"),
