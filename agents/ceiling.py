@@ -2,10 +2,9 @@
 
     python -m agents.ceiling --population evaluation --patients 24 --seed 0 --out docs/ceiling.csv
 
-A schedule is the device's PID with an authority and a lag of the setpoint behind the reference, one pair until the arm
-is up and another one after. All schedules are tried on the same episode in one batch, and the best is picked with
-hindsight, which no policy has: policies of this kind can hardly get beyond it. What it leaves out are schedules that
-change more often, and antagonist ropes.
+A schedule is the device's PID with an authority and a setpoint below the reference, one pair until the arm is up and
+another one after. All schedules are tried on the same episode in one batch, and the best is picked with hindsight,
+which no policy has. It leaves out schedules that change more often, setpoints above the reference and antagonist ropes.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import tyro
 from tqdm import tqdm
 
 from agents.evaluate import patient_seeds
+from dms_core.errors import SimulationError
 from dms_core.output_file import check_writable, whole_file
 from exo_env.actions import PidSetpoint
 from exo_env.control_period import READING
@@ -55,7 +55,7 @@ def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> dict[s
         works[1] += np.maximum(r[:, READING.muscle_moment] * r[:, READING.rate], 0.0)
         alive &= ~terminated
         if not alive.all():
-            break
+            raise SimulationError(f"a schedule ended the episode of seed {seed} at {time:.2f} s; none should.")
     share, rms = works[0] / works.sum(axis=0), np.sqrt(square / (len(episode.times) - 1))
     best = int(np.argmax(np.where(alive, returns, -np.inf)))
     least = share[alive & (rms <= rms[0] + MORE_ERROR)].min()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
-from dms_core.assembly.arena import floats, ints, matrix, table_at
+from dms_core.assembly.arena import Packed, floats, ints, matrix, table_at
 from dms_core.simulation.step_control import DONE
 from exo_env.control_period import PLANT, READING, STATUS, run_period
 from exo_env.effort import STATE as EFFORT
@@ -71,15 +71,17 @@ class Batch:
     def __init__(self, size: int, observed: int, threads: int | None = None) -> None:
         self.threads = min(size, threads or _cores())
         self._addresses = np.zeros(size, np.int64)
+        # Compiled code knows addresses only: what they point to is kept here.
+        self.worlds: list[Packed | None] = [None] * size
         self.observations = np.zeros((size, observed), np.float32)
         self.numbers = np.zeros((size, len(NUMBERS)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
-    def put(self, i: int, table: np.ndarray) -> None:
-        """World i is that of a packed Plant, which the caller keeps alive."""
-        self._addresses[i] = table.ctypes.data
-        collect(table, self.observations[i], self.numbers[i], self.status[i])
+    def put(self, i: int, world: Packed) -> None:
+        """World i is that of a packed Plant."""
+        self.worlds[i], self._addresses[i] = world, world.table.ctypes.data
+        collect(world.table, self.observations[i], self.numbers[i], self.status[i])
 
     def run(self, which: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, 2).
@@ -92,8 +94,13 @@ class Batch:
             _run(given, 0, len(which))
         else:
             edges = np.linspace(0, len(which), min(CHUNKS * self.threads, len(which)) + 1).astype(int)
-            for job in [self._pool.submit(_run, given, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]:
-                job.result()
+            jobs = [self._pool.submit(_run, given, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+            try:
+                for job in jobs:
+                    job.result()
+            finally:
+                # An interrupt must not leave threads behind that still write.
+                wait(jobs)
         return which[self.status[which, STATUS.code] != DONE]
 
     def close(self) -> None:

@@ -13,7 +13,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from dms_core import Model, SolverOptions
+from dms_core.errors import SimulationError
 from dms_core.model import Constant
+from dms_core.results import Result
 from dms_core.simulation.dynamics import World
 from exo_env.actions import DRIVES, Drive, drive_inputs
 from exo_env.ecosystem import Ecosystem
@@ -100,7 +102,8 @@ class Episode:
         self.model = Model(system, like=template(mode))
         self.world = World(self.model, options)
         # Accelerations and reactions of the start, for the first reading.
-        self.world.settle()
+        if self.world.settle() is not Result.SUCCESS:
+            raise SimulationError(f"{self.world.result.value} (at the start of an episode)")
 
     @cached_property
     def names(self) -> dict[str, int]:

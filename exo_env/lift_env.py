@@ -14,7 +14,8 @@ from dms_core import SolverOptions
 from dms_core.assembly.arena import Packed
 from dms_core.errors import InputError, choices
 from dms_core.results import Result
-from dms_core.simulation.step_control import DONE
+from dms_core.simulation.dynamics import RESULT_OF
+from dms_core.simulation.step_control import DONE, MATRIX_SINGULAR
 from exo_env.actions import checked_action, drive
 from exo_env.control_period import READING, STATUS, Plant, begin, finish, run_period
 from exo_env.ecosystem import Ecosystem
@@ -259,7 +260,7 @@ class ElbowLiftEnv(gymnasium.Env):
         """The present episode.
 
         Raises:
-            DmsError: `reset` was not called.
+            gymnasium.error.ResetNeeded: `reset` was not called.
         """
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("The environment has no episode; call reset() first.")
@@ -288,9 +289,9 @@ class ElbowLiftEnv(gymnasium.Env):
         return plant.observation.astype(np.float32), float(plant.reward[0]), terminated, truncated, self._info()
 
     @property
-    def table(self) -> np.ndarray:
+    def packed(self) -> Packed:
         """The packed Plant of the present episode, for a batch."""
-        return self._packed.table
+        return self._packed
 
     @property
     def table_values(self) -> Plant:
@@ -299,9 +300,13 @@ class ElbowLiftEnv(gymnasium.Env):
 
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
-        episode, world = self.episode, self.episode.world
-        result = world.advance(float(episode.times[self._plant.status[STATUS.step] + 1]))
-        if result is Result.SUCCESS:
+        episode, world, status = self.episode, self.episode.world, self._plant.status
+        world.result = RESULT_OF[int(status[STATUS.code])]
+        if status[STATUS.code] == MATRIX_SINGULAR:
+            world.advance(float(episode.times[status[STATUS.step] + 1]))
+        if world.result is Result.INTERRUPTED:
+            raise KeyboardInterrupt
+        if world.result is Result.SUCCESS:
             self._plant.status[STATUS.code] = DONE
             self._plant = self._plant._replace(model=world.tables, world=world.packed)
             self._packed = Packed(self._plant)

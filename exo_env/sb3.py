@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
+from dms_core.errors import InputError
 from exo_env.vector_env import ElbowLiftVectorEnv
 
 
@@ -16,7 +17,8 @@ class ElbowLiftVecEnv(VecEnv):
     """N worlds that reset by themselves; infos of an ended episode have what SB3 looks for.
 
     `terminal_observation` is the last observation, and `TimeLimit.truncated` tells an episode that time ended from one
-    that an event did, so that value estimates bootstrap where they should. An ended episode's own info is in it too.
+    that an event did, so that value estimates bootstrap where they should. An ended episode's time, effort and
+    solver_failed are in it too.
 
     Args:
         num_envs: number of worlds.
@@ -33,6 +35,8 @@ class ElbowLiftVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """First observations, shape (num_envs, n); seeds are those of `seed`."""
+        if any(self._options):
+            raise InputError("set_options is not supported; give patient, load and reference as settings.")
         seeds = [s for s in self._seeds if s is not None]
         found, _ = self.worlds.reset(seed=seeds if len(seeds) == self.num_envs else None)
         self._reset_seeds()

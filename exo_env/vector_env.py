@@ -83,6 +83,8 @@ class ElbowLiftVectorEnv(VectorEnv):
         mask = self._mask(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
         infos: dict[str, Any] = {}
+        # A reset that fails half-way leaves nothing to step.
+        self._over[mask], self._started = True, False
         for i in np.flatnonzero(mask).tolist():
             infos = self._add_info(infos, self._reset(i, seeds[i], options), i)
         self._started = True
@@ -111,7 +113,7 @@ class ElbowLiftVectorEnv(VectorEnv):
     def _reset(self, i: int, seed: int | None = None, options: dict[str, Any] | None = None) -> dict[str, Any]:
         """A new episode in world i; gives its info."""
         _, info = self.envs[i].reset(seed=seed, options=options)
-        self._batch.put(i, self.envs[i].table)
+        self._batch.put(i, self.envs[i].packed)
         self._over[i] = False
         return info
 
@@ -128,11 +130,14 @@ class ElbowLiftVectorEnv(VectorEnv):
         used = self._checked(actions)
         if not self._started or (self.autoreset_mode == AutoresetMode.DISABLED and self._over.any()):
             raise gymnasium.error.ResetNeeded("An episode is over, or none has begun; call reset() first.")
+        for i, env in enumerate(self.envs):
+            if env.packed is not self._batch.worlds[i]:
+                raise gymnasium.error.ResetNeeded(f"World {i} was reset by itself; call reset() of the batch.")
         running = ~self._over
         which = np.flatnonzero(running)
         for i in self._batch.run(which, used):
             self.envs[i].rescue()
-            self._batch.put(i, self.envs[i].table)
+            self._batch.put(i, self.envs[i].packed)
         status = self._batch.status
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
         terminated = running & (status[:, STATUS.event] != NOTHING)
@@ -199,6 +204,10 @@ class ElbowLiftVectorEnv(VectorEnv):
     def render(self) -> tuple[Any, ...] | None:
         """A picture of each world."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Refused: the worlds are addresses of this process."""
+        raise TypeError("ElbowLiftVectorEnv cannot be copied or pickled; make another one of the same settings.")
 
     def close_extras(self, **kwargs: Any) -> None:
         """End threads and windows."""

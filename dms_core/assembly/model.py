@@ -246,7 +246,7 @@ class Model:
         scale_q, scale_v = np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1])
         return Tables(
             dynamics.values, constraints.values, self._sensors.values, newton, newton_lu, rates, rate_lu, free, solved,
-            self.second_order, scale_q, scale_v, part_addresses(),
+            self.second_order, scale_q, scale_v, sum(len(c.iu) > 0 for c in layout.constraints), part_addresses(),
         )  # fmt: skip
 
     def _with_orders_of(self, like: Model) -> Tables:

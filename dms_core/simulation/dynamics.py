@@ -40,7 +40,7 @@ from dms_core.simulation.state import (
 BUFFER_ROWS = 256
 """Steps recorded between two returns to Python: short enough for a smooth progress bar."""
 
-_RESULTS = {
+RESULT_OF = {
     step_control.DONE: Result.SUCCESS,
     step_control.STEP_TOO_SMALL: Result.STEP_TOO_SMALL,
     step_control.NEWTON_FAILED: Result.NEWTON_FAILED,
@@ -169,7 +169,7 @@ class World:
         except KeyboardInterrupt:
             self.result = Result.INTERRUPTED
             return self.result
-        self.result = _RESULTS[code]
+        self.result = RESULT_OF[code]
         return self.result
 
     def _advance(self, t_end: float, progress: Callable[[float], None] | None) -> int:

@@ -10,7 +10,7 @@ which changes first-order rates and accelerations linearly and leaves the matrix
 
 import math
 
-from dms_core.assembly.arena import flags, floats, indices, inner, ints
+from dms_core.assembly.arena import flags, floats, indices, inner, ints, number
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.parts import RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
@@ -142,12 +142,12 @@ def stage_rates(m, s):
 
 @compiled
 def jump_rates(m, s):
-    """As consistent_rates behind a jump of the inputs, with the factors at hand; False if there are none.
+    """As consistent_rates behind a jump of the inputs, with the factors at hand; False without them or with a driver.
 
     q and v are those of the factors, and only rows of equations that read an input are open. Where one reads it not
     linearly, what is left over concerns the guess and the error estimate of the step alone.
     """
-    if ints(s, STATE.counts)[RATES_FACTORED] != 1:
+    if ints(s, STATE.counts)[RATES_FACTORED] != 1 or number(m, MODEL.driven) > 0:
         return False
     _put_state(m, s)
     run_part(m, s, RESIDUAL)

@@ -38,6 +38,8 @@ class Tables(NamedTuple):
     """True for second-order coordinates, whose vdot appears in their row, (n_q,)."""
     scale_q: np.ndarray
     scale_v: np.ndarray
+    driven: int
+    """Constraints that read an input: a jump of it opens rows of accelerations."""
     parts: np.ndarray
     """Addresses of the parts of a step, see parts.py."""
 
@@ -130,6 +132,7 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
 def with_tables(tables: Tables, state: State) -> Packed:
     """The same world for other rows and elimination orders: it starts afresh, with multipliers 0 as their guess."""
     state.counts[RESTART] = state.counts[STALE] = 1
+    state.counts[RATES_FACTORED] = 0
     state.lam[:], state.mu[:] = 0.0, 0.0
     state.w.lam[:], state.w.mu[:] = 0.0, 0.0
     return Packed(State(**{**state._asdict(), **_linear_arrays(tables)}))

@@ -185,15 +185,13 @@ def one_step(m, s, o, stop, kept):
             return STEP_TOO_SMALL if code == CONVERGED else NEWTON_FAILED
     note_errors(s)
     accept(s, h, c0, started)
-    # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2.
-    if o.one_step == 1:
-        # Between two landings only a record wants them.
-        if (kept or h == rest) and not stage_rates(m, s):
-            return RATES_FAILED
-    elif started:
-        consistent_rates(m, s)
     if h == rest:
         land(s, stop)
+    # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2. SDIRK2
+    # throughout wants them between two landings only for a record.
+    wanted_rates = kept or h == rest if o.one_step == 1 else started
+    if wanted_rates and not (o.one_step == 1 and stage_rates(m, s)) and not consistent_rates(m, s):
+        return RATES_FAILED
     if equal:
         clock[WORST] = max(clock[WORST], error)
         if h == rest or not first_try:
