@@ -24,7 +24,7 @@ from agents.baselines import POLICIES
 from agents.evaluate import evaluate as run_all
 from agents.evaluate import table
 from agents.export import export
-from agents.figure import draw, require_matplotlib
+from agents.figure import draw
 from agents.learned import find_policy, shipped_policies
 from agents.report import report
 from agents.sweep import sweep
@@ -34,6 +34,7 @@ from agents.video import video
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, write_json
+from exo_env.panels import require_matplotlib
 from exo_env.population import population as find_population
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium
 import numpy as np
 
-from agents.evaluate import ENVIRONMENT
+from agents.evaluate import world_of
 from agents.policy import Policy
 from exo_env.population import Source, population
 
@@ -49,10 +48,7 @@ def course(policy: Policy, patient: Source, seed: int, options: dict[str, Any] |
         seed: of the episode.
         options: of the environment's reset.
     """
-    env = gymnasium.make(
-        ENVIRONMENT, disable_env_checker=True, patient=population(patient).model_dump(),
-        action_mode=policy.action_mode, observation=list(policy.observation),
-    )  # fmt: skip
+    env = world_of(policy, population(patient).model_dump())
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=options)
     policy.reset(env)

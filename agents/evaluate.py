@@ -72,7 +72,15 @@ def evaluate(
     check_numbers(patients, seed)
     source, cases = population(patients_of), cases_of(seed, patients, loads)
     episodes = [episodes_of(one, source.model_dump(), cases, settings, progress) for one in policies]
-    return results_of(policies, episodes, source.title, patients, seed)
+    return results_of(policies, episodes, source.title, patients, seed, loads)
+
+
+def world_of(policy: Policy, patient: Source, **settings: Any) -> gymnasium.Env:
+    """The environment that a policy acts in; `settings`: further ones of it."""
+    return gymnasium.make(
+        ENVIRONMENT, disable_env_checker=True, patient=patient, action_mode=policy.action_mode,
+        observation=list(policy.observation), **settings,
+    )  # fmt: skip
 
 
 def check_numbers(patients: int, seed: int) -> None:
@@ -94,11 +102,7 @@ def episodes_of(
     progress: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Episodes of a policy, one a case."""
-    env = gymnasium.make(
-        ENVIRONMENT, disable_env_checker=True, patient=patient, action_mode=one.action_mode,
-        observation=list(one.observation), **settings,
-    )  # fmt: skip
-    found = []
+    env, found = world_of(one, patient, **settings), []
     for number, load in cases:
         found.append({"seed": number, **episode(env, one, number, load)})
         if progress is not None:
@@ -108,8 +112,9 @@ def episodes_of(
 
 
 def results_of(
-    policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], title: str, patients: int, seed: int
-) -> dict[str, Any]:
+    policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], title: str, patients: int, seed: int,
+    loads: Sequence[float] = (),
+) -> dict[str, Any]:  # fmt: skip
     """What `evaluate` returns, from the episodes of each policy."""
     found = {}
     for one, those in zip(policies, episodes, strict=True):
@@ -119,8 +124,9 @@ def results_of(
             "difference": differences(those, episodes[0], seed), "episodes": those,
         }  # fmt: skip
     return {
-        "population": title, "patients": patients, "seed": seed, "statistic": "interquartile mean",
-        "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE, "policies": found,
+        "population": title, "patients": patients, "loads": list(loads), "seed": seed,
+        "statistic": "interquartile mean", "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE,
+        "policies": found,
     }  # fmt: skip
 
 
@@ -158,10 +164,10 @@ def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, fl
 
 def by_patient(episodes: list[dict[str, Any]], measure: str) -> np.ndarray:
     """Mean of a measure over the episodes of each patient, shape (n,); NaN where it could not be measured."""
-    values: dict[int, list[float]] = {}
+    values: dict[int, list[float | None]] = {}
     for e in episodes:
         values.setdefault(e["seed"], []).append(e["measures"][measure])
-    return np.array([np.mean([x for x in v if np.isfinite(x)] or [np.nan]) for v in values.values()])
+    return np.array([np.mean([x for x in v if x is not None and np.isfinite(x)] or [np.nan]) for v in values.values()])
 
 
 def differences(episodes: list[dict[str, Any]], others: list[dict[str, Any]], seed: int) -> dict[str, dict[str, float]]:

@@ -2,53 +2,31 @@
 
 from __future__ import annotations
 
-import io
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from agents.measures import MEASURES
-from dms_core.errors import DmsError
-from dms_core.output_file import check_writable
+from exo_env.panels import panels, save
 
-COLUMNS, RESOLUTION = 3, 150
+COLUMNS = 3
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Distinct for colour-blind readers (Okabe and Ito 2008)."""
 
 
-def require_matplotlib() -> None:
-    """Say so before a long run where the figure could not be drawn.
-
-    Raises:
-        DmsError: matplotlib is missing.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise DmsError("the figure needs matplotlib; install it with: pip install 'exo-env[pictures]'") from None
-
-
 def draw(path: Path, results: dict[str, Any]) -> None:
     """Draw an evaluation as PNG, by software, whole or not at all."""
-    require_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names = list(results["policies"])
     rows = -(-len(MEASURES) // COLUMNS)
-    figure = Figure(figsize=(9.0, rows * (0.9 + 0.4 * len(names))), dpi=RESOLUTION, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, COLUMNS, sharey=True, squeeze=False)
+    figure, axes = panels(rows, COLUMNS, (9.0, rows * (0.9 + 0.4 * len(names))), sharey=True)
     for ax, m in zip(axes.flat, MEASURES, strict=False):
         for k, name in enumerate(names):
             _row(ax, k, results["policies"][name], m.name)
         ax.set_title(m.label if m.unit == "-" else f"{m.label} [{m.unit}]", fontsize=9)
         ax.set_yticks(range(len(names)), [results["policies"][n]["title"] for n in names])
         ax.set_ylim(len(names) - 0.5, -0.5)
-        ax.grid(True, axis="x", color="0.9", linewidth=0.6)
-        ax.spines[["top", "right"]].set_visible(False)
+        ax.grid(False, axis="y")
     for ax in list(axes.flat)[len(MEASURES) :]:
         ax.set_visible(False)
     n, percent = results["patients"], 100.0 * results["confidence"]
@@ -56,16 +34,6 @@ def draw(path: Path, results: dict[str, Any]) -> None:
         f"{results['population']}: {n} patients, interquartile mean and {percent:g} % interval", fontsize=10
     )
     save(figure, path)
-
-
-def save(figure: Any, path: Path) -> None:
-    """Write a picture as PNG, whole or not at all."""
-    check_writable(path)
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png")
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_bytes(picture.getvalue())
-    os.replace(temporary, path)
 
 
 def _row(ax: Any, k: int, found: dict[str, Any], measure: str) -> None:

@@ -13,14 +13,14 @@ from agents import report_figures
 from agents.baselines import POLICIES
 from agents.config import Config
 from agents.courses import Course, course
-from agents.evaluate import table_rows
-from agents.figure import require_matplotlib
-from agents.learned import find_policy
+from agents.evaluate import differences, table_rows
+from agents.learned import find_policy, shipped_policies
 from agents.policy import Policy
 from agents.report_figures import Group
 from agents.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, whole_file
+from exo_env.panels import require_matplotlib
 from exo_env.population import population, shipped_populations
 
 EVALUATION = "evaluation.json"
@@ -80,9 +80,12 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
             found = _json(path if path.is_file() else path / EVALUATION)
             if not isinstance(found, dict) or not {"population", "patients", "seed", "policies"} <= found.keys():
                 raise InputError(f"'{path}' is not an evaluation.")
-            key = tuple(found[k] for k in ("population", "patients", "seed"))
+            key = (*(found[k] for k in ("population", "patients", "seed")), *found.get("loads", ()))
             known = evaluations.setdefault(key, {**found, "policies": {}})
             known["policies"] |= found["policies"]
+            first = next(iter(known["policies"].values()))["episodes"]
+            for one in known["policies"].values():
+                one["difference"] = differences(one["episodes"], first, known["seed"])
         else:
             raise InputError(f"'{path}' is neither the folder of a training nor an evaluation.")
     return trainings, list(evaluations.values())
@@ -165,7 +168,7 @@ def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], training
     shown: list[Policy] = []
     for name in dict.fromkeys([*learned[:1], *baselines]):
         # The folder of a policy that was evaluated may be gone.
-        if name in POLICIES or Path(name).is_dir():
+        if name in POLICIES or name in shipped_policies() or Path(name).is_dir():
             shown.append(find_policy(name))
     return shown[:2]
 
@@ -195,5 +198,5 @@ def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -
     """An episode of an evaluation once more: to the last bit where its population is a shipped one."""
     for name in shipped_populations():
         if population(name).title == results["population"]:
-            return course(policy, name, one["seed"])
+            return course(policy, name, one["seed"], {"load": one["load"]} if results.get("loads") else None)
     return course(policy, one["patient"], one["seed"], {k: one[k] for k in ("load", "reference")})

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from agents.courses import Course
-from agents.figure import COLOURS, RESOLUTION, save
+from agents.figure import COLOURS
+from exo_env.panels import legend, panels, save
 
 CURVES = (
     ("return", "return of an episode"),
@@ -31,7 +32,7 @@ class Group:
 
 def learning_curves(path: Path, groups: Sequence[Group]) -> None:
     """Mean over the seeds and, as a band, the lowest to the highest of them."""
-    figure, axes = _panels(1, len(CURVES), (3.4 * len(CURVES), 3.4))
+    figure, axes = panels(1, len(CURVES), (3.4 * len(CURVES), 3.4), sharex="col")
     for ax, (name, label) in zip(axes.flat, CURVES, strict=True):
         for k, group in enumerate(groups):
             steps, values = on_common_steps(group.curves, name)
@@ -42,7 +43,7 @@ def learning_curves(path: Path, groups: Sequence[Group]) -> None:
         ax.set_xlabel("environment steps")
         ax.set_title(label, fontsize=10)
         ax.ticklabel_format(axis="x", style="sci", scilimits=(0, 4), useMathText=True)
-    _legend(figure, axes.flat[0])
+    legend(figure, axes.flat[0], 4)
     save(figure, path)
 
 
@@ -64,7 +65,7 @@ def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) ->
 
 def pareto(path: Path, results: Mapping[str, Any]) -> None:
     """Tracking over the share of the work that the device does: low is good in both, and one costs the other."""
-    figure, axes = _panels(1, 1, (6.4, 4.4))
+    figure, axes = panels(1, 1, (6.4, 4.4))
     (ax,) = axes.flat
     for k, found in enumerate(results["policies"].values()):
         x, y = (found["summary"][name] for name in ("device_work_share", "tracking_rms_deg"))
@@ -86,7 +87,7 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
         "low is good in both, dotted: beaten by none",
         fontsize=9,
     )
-    _legend(figure, ax, 3)
+    legend(figure, ax, 3)
     save(figure, path)
 
 
@@ -108,7 +109,7 @@ ROWS = (
 
 def courses(path: Path, columns: Mapping[str, Sequence[Course]]) -> None:
     """Patients over time, a column a patient, a colour a policy."""
-    figure, axes = _panels(len(ROWS), len(columns), (1.2 + 4.4 * len(columns), 9.6), sharey="row")
+    figure, axes = panels(len(ROWS), len(columns), (1.2 + 4.4 * len(columns), 9.6), sharex="col", sharey="row")
     for column, (title, found) in zip(axes.T, columns.items(), strict=True):
         y = max((one.columns for one in found), key=lambda c: len(c["time"]))
         column[0].plot(y["time"], np.degrees(y["reference"]), color="0.55", linewidth=3.5, alpha=0.6, label="reference")
@@ -122,7 +123,7 @@ def courses(path: Path, columns: Mapping[str, Sequence[Course]]) -> None:
         for other in axes[list(axes[:, 0]).index(ax)] if lines else ():
             other.set_title(lines, fontsize=7, loc="right", pad=2, color="0.3")
     figure.align_ylabels()
-    _legend(figure, axes[0, 0])
+    legend(figure, axes[0, 0], 4)
     save(figure, path)
 
 
@@ -149,23 +150,3 @@ def _course(column: Any, one: Course, colour: str) -> None:
 def _short(event: str) -> str:
     """The first words of what ended an episode."""
     return event if len(event) <= 60 else event[:57].rsplit(" ", 1)[0] + " ..."
-
-
-def _panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:
-    """A figure with panels, drawn by software."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, dpi=RESOLUTION, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, columns, sharex="col", squeeze=False, **shared)
-    for ax in axes.flat:
-        ax.grid(True, color="0.9", linewidth=0.6)
-        ax.spines[["top", "right"]].set_visible(False)
-    return figure, axes
-
-
-def _legend(figure: Any, ax: Any, columns: int = 4) -> None:
-    """Above the panels, never on a curve."""
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False, fontsize=8)

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from agents.tuned import FILE
 from agents.tuning import MEASURED, POPULATION, Try, tunable, tune
 from dms_core.config_files import configs
-from dms_core.output_file import check_writable
+from dms_core.output_file import check_writable, whole_file
 
 TRIES = "baselines_tries.csv"
 
@@ -41,8 +41,9 @@ def tune_baselines(
 
         for name in tunable():
             found[name] = tune(name, tries, patients, seed, workers=workers, progress=progress)
-    (folder / Path(FILE).name).write_text(_yaml(found, command))
-    (folder / TRIES).write_text(_table(found, command))
+    for path, text in ((folder / Path(FILE).name, _yaml(found, command)), (folder / TRIES, _table(found, command))):
+        with whole_file(path) as file:
+            file.write(text)
     for name, ranked in found.items():
         best = ranked[0]
         print(f"{name:18} return {best.measures['return']:.1f}  {best.numbers}")

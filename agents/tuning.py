@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Any
 
-import gymnasium
 import numpy as np
 from scipy.stats import qmc
 
 from agents.baselines import POLICIES
-from agents.evaluate import ENVIRONMENT, episode, patient_seeds
+from agents.evaluate import episode, patient_seeds, world_of
 from agents.tuned import Range
 from dms_core.errors import InputError
 
@@ -47,10 +47,7 @@ def tunable() -> dict[str, dict[str, Range]]:
 def trial(policy: str, numbers: dict[str, float], seeds: list[int], settings: dict[str, Any]) -> Try:
     """Means over the episodes of some seeds."""
     acting = POLICIES[policy](**numbers)
-    env = gymnasium.make(
-        ENVIRONMENT, disable_env_checker=True, patient=POPULATION, action_mode=acting.action_mode,
-        observation=list(acting.observation), **settings,
-    )  # fmt: skip
+    env = world_of(acting, POPULATION, **settings)
     found = [episode(env, acting, seed)["measures"] for seed in seeds]
     env.close()
     return Try(policy, numbers, {m: float(np.nanmean([f[m] for f in found])) for m in MEASURED})
@@ -97,7 +94,8 @@ def tune(
     def run(places: np.ndarray, pool: ProcessPoolExecutor) -> None:
         """Try these places, each from 0 to 1 in every range."""
         rows = [{n: r.at(x) for (n, r), x in zip(ranges.items(), place, strict=True)} for place in places]
-        for place, one in zip(places, pool.map(_trial, [(policy, row, seeds, settings) for row in rows]), strict=True):
+        tried = pool.map(trial, repeat(policy), rows, repeat(seeds), repeat(settings))
+        for place, one in zip(places, tried, strict=True):
             found.append((place, one))
             if progress is not None:
                 progress(policy)
@@ -110,10 +108,6 @@ def tune(
             count = min(BATCH, tries - len(found))
             run(np.clip(best + SPREAD * generator.standard_normal((count, len(ranges))), 0.0, 1.0), pool)
     return [one for _, one in sorted(found, key=_return, reverse=True)]
-
-
-def _trial(arguments: tuple[str, dict[str, float], list[int], dict[str, Any]]) -> Try:
-    return trial(*arguments)
 
 
 def _return(entry: tuple[np.ndarray, Try]) -> float:

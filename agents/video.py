@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-import gymnasium
 import numpy as np
 from tqdm import tqdm
 from tyro.conf import arg
 
-from agents.evaluate import ENVIRONMENT
+from agents.evaluate import world_of
 from agents.learned import find_policy
 from agents.policy import Policy
 from dms_core.errors import DmsError, InputError
@@ -65,10 +64,7 @@ class Stage:
 
     def __init__(self, policy: Policy, patient: str, seed: int) -> None:
         self.policy = policy
-        self.env = gymnasium.make(
-            ENVIRONMENT, disable_env_checker=True, patient=population(patient).model_dump(), render_mode="rgb_array",
-            action_mode=policy.action_mode, observation=list(policy.observation),
-        )  # fmt: skip
+        self.env = world_of(policy, population(patient).model_dump(), render_mode="rgb_array")
         self.observation, self.info = self.env.reset(seed=seed)
         policy.reset(self.env)
         world: Any = self.env.unwrapped

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
-import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dms_core.errors import DmsError
-from dms_core.output_file import check_writable
 from exo_env.measures import magnitude
+from exo_env.panels import legend, panels, save
 from exo_env.scenarios import ScenarioRun
 
 if TYPE_CHECKING:
@@ -21,39 +18,19 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Of scenarios 1 to 4, distinct for colour-blind readers (Okabe and Ito 2008)."""
 DASHES = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)))
-WIDTH, HEIGHT, RESOLUTION = 7.0, 3.6, 150
-"""Of a figure of one panel [inch], [inch], [dots per inch]."""
+WIDTH, HEIGHT = 7.0, 3.6
+"""Of a figure of one panel [inch]."""
 
 Course = Callable[[ScenarioRun], np.ndarray]
 
 
 def _panels(count: int) -> tuple[Any, list[Any]]:
-    """A figure with panels one below the other."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise DmsError("figures need matplotlib; install it with: pip install 'exo-env[pictures]'") from None
-    figure = Figure(figsize=(WIDTH, HEIGHT * (0.25 + 0.75 * count)), dpi=RESOLUTION, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    for ax in axes:
-        ax.grid(True, color="0.9", linewidth=0.6)
-        ax.spines[["top", "right"]].set_visible(False)
+    """A figure with panels one below the other, over time."""
+    figure, axes = panels(count, 1, (WIDTH, HEIGHT * (0.25 + 0.75 * count)), sharex=True)
+    for ax in axes[:, 0]:
         ax.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-    axes[-1].set_xlabel("time [s]")
-    return figure, list(axes)
-
-
-def _save(figure: Any, path: Path) -> Path:
-    """Write the picture whole or not at all."""
-    check_writable(path)
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png")
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_bytes(picture.getvalue())
-    os.replace(temporary, path)
-    return path
+    axes[-1, 0].set_xlabel("time [s]")
+    return figure, list(axes[:, 0])
 
 
 def _draw(ax: Any, runs: Iterable[tuple[int, ScenarioRun]], course: Course) -> None:
@@ -63,11 +40,8 @@ def _draw(ax: Any, runs: Iterable[tuple[int, ScenarioRun]], course: Course) -> N
 
 
 def _legend(figure: Any, ax: Any) -> None:
-    """Beside the curves, never on them."""
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside upper center", ncols=2 if len(labels) == 4 else 3, frameon=False, fontsize=8
-    )
+    """Four scenarios in two columns, else all beside each other."""
+    legend(figure, ax, 2 if len(ax.get_legend_handles_labels()[1]) == 4 else 3)
 
 
 def _sensor(name: str, factor: float = 1.0) -> Course:
@@ -96,7 +70,7 @@ def step_response(path: Path, times: np.ndarray, angle: np.ndarray, target: floa
         fontsize=9,
     )
     _legend(figure, ax)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def scenario_figures(folder: Path, runs: Sequence[ScenarioRun]) -> list[Path]:
@@ -134,7 +108,7 @@ def _trajectories(path: Path, runs: list[tuple[int, ScenarioRun]]) -> Path:
     above.set_ylabel("elbow flexion [deg]")
     below.set_ylabel("flexion - reference [deg]")
     _legend(figure, above)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _pair(
@@ -149,7 +123,7 @@ def _pair(
         # Next to nothing shall look like it: a rope that stays slack is drawn on a scale of newtons.
         ax.set_ylim(low if high > 1.0 else -0.1, max(high, 1.0))
     _legend(figure, axes[0])
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _moments(path: Path, runs: list[tuple[int, ScenarioRun]]) -> Path:
@@ -161,4 +135,4 @@ def _moments(path: Path, runs: list[tuple[int, ScenarioRun]]) -> Path:
         _draw(ax, runs, course)
         ax.set_ylabel(f"{label} [Nm]")
     _legend(figure, axes[0])
-    return _save(figure, path)
+    return save(figure, path)

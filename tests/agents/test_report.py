@@ -58,6 +58,13 @@ def test_a_course_of_an_unknown_population_keeps_patient_load_and_repetition():
     )
 
 
+def test_a_course_has_the_load_that_was_lifted():
+    found = evaluate([policy("pid")], "stroke_mild", 1, 0, loads=(0.6, 1.4))
+    for one in found["policies"]["pid"]["episodes"]:
+        again = _again(policy("pid"), one, found)
+        assert again.load == one["load"] and again.patient == one["patient"]
+
+
 def test_same_seed_is_the_same_patient_for_all_policies():
     one, other = (course(policy(n), "stroke_severe", 3) for n in ("pid", "none"))
     assert one.patient == other.patient and one.load == other.load and one.columns["time"][-1] == pytest.approx(6.0)
@@ -86,6 +93,16 @@ def test_evaluations_of_the_same_patients_are_one(evaluated, tmp_path):
     assert main(arguments) == 0
     _, (one,) = collected([evaluated, tmp_path / "evaluation.json"])
     assert list(one["policies"]) == ["pid", "none", "assist_as_needed"]
+    # Every difference is to the first policy of all, not of its own file.
+    for name, found in one["policies"].items():
+        means = [found["summary"]["return"], one["policies"]["pid"]["summary"]["return"]]
+        assert found["difference"]["return"]["value"] == pytest.approx(means[0]["value"] - means[1]["value"]), name
+
+
+def test_evaluations_with_other_loads_stay_apart(evaluated, tmp_path):
+    assert main(["evaluate", "--policy", "pid", "--patients", "2", "--loads", "1.0", "--out", str(tmp_path)]) == 0
+    _, found = collected([evaluated, tmp_path])
+    assert [one["loads"] for one in found] == [[], [1.0]]
 
 
 @pytest.mark.parametrize(

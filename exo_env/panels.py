@@ -1,0 +1,58 @@
+"""What all figures of this project have in common: panels drawn by software (Agg), so that no display is needed."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+from dms_core.errors import DmsError
+from dms_core.output_file import check_writable
+
+RESOLUTION = 150
+"""[dots per inch]"""
+
+
+def require_matplotlib() -> None:
+    """Say so before a long run where a figure could not be drawn.
+
+    Raises:
+        DmsError: matplotlib is missing.
+    """
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise DmsError("figures need matplotlib; install it with: pip install 'exo-env[pictures]'") from None
+
+
+def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:
+    """A figure of a size [inch] with axes, shape (rows, columns); `shared`: of matplotlib's Figure.subplots."""
+    require_matplotlib()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, dpi=RESOLUTION, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, columns, squeeze=False, **shared)
+    for ax in axes.flat:
+        ax.grid(True, color="0.9", linewidth=0.6)
+        ax.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def legend(figure: Any, ax: Any, columns: int) -> None:
+    """Of the curves in `ax`, above the panels and never on a curve."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False, fontsize=8)
+
+
+def save(figure: Any, path: Path) -> Path:
+    """Write a picture as PNG, whole or not at all."""
+    check_writable(path)
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png")
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_bytes(picture.getvalue())
+    os.replace(temporary, path)
+    return path
