@@ -50,7 +50,7 @@ def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> dict[s
         _, rewards, terminated, _, told = worlds.step(actions)
         returns += np.where(alive, rewards, 0.0)
         square += told["tracking_error_deg"] ** 2
-        r = np.array([env.table_values.reading for env in worlds.envs])
+        r = np.array([env.packed.values.reading for env in worlds.envs])
         works[0] += np.maximum(r[:, READING.exo_moment] * r[:, READING.hinge_rate], 0.0)
         works[1] += np.maximum(r[:, READING.muscle_moment] * r[:, READING.rate], 0.0)
         alive &= ~terminated

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor, wait
+from functools import partial
 
 import numpy as np
 
-from dms_core.assembly.arena import Packed, floats, ints, matrix, table_at
+from dms_core.assembly.arena import Packed, floats, ints, table_at
 from dms_core.simulation.step_control import DONE
 from exo_env.control_period import PLANT, READING, STATUS, run_period
 from exo_env.effort import STATE as EFFORT
@@ -27,7 +28,7 @@ def collect(p, observation, numbers, status):
     seen, r, terms, now = (
         floats(p, PLANT.observation),
         floats(p, PLANT.reading),
-        matrix(p, PLANT.terms)[0],
+        floats(p, PLANT.terms),
         ints(p, PLANT.status),
     )
     for i in range(observation.shape[0]):
@@ -43,7 +44,7 @@ def collect(p, observation, numbers, status):
 
 
 @compiled(nogil=True)
-def run_some(addresses, which, first, last, actions, observations, numbers, status):
+def run_some(addresses, which, actions, observations, numbers, status, first, last):
     """A control period of the worlds which[first:last]; where the solver gives up, `status` holds its code."""
     for k in range(first, last):
         i = which[k]
@@ -89,12 +90,12 @@ class Batch:
         Returns:
             Those whose solver gave up.
         """
-        given = (self._addresses, which, actions, self.observations, self.numbers, self.status)
+        share = partial(run_some, self._addresses, which, actions, self.observations, self.numbers, self.status)
         if self._pool is None or len(which) == 1:
-            _run(given, 0, len(which))
+            share(0, len(which))
         else:
-            edges = np.linspace(0, len(which), min(CHUNKS * self.threads, len(which)) + 1).astype(int)
-            jobs = [self._pool.submit(_run, given, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+            edges = np.linspace(0, len(which), min(CHUNKS * self.threads, len(which)) + 1).astype(int).tolist()
+            jobs = [self._pool.submit(share, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
             try:
                 for job in jobs:
                     job.result()
@@ -113,8 +114,3 @@ class Batch:
 def _cores() -> int:
     """That this process may use, where the system says so."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _run(given: tuple[np.ndarray, ...], first: int, last: int) -> None:
-    addresses, which, actions, observations, numbers, status = given
-    run_some(addresses, which, first, last, actions, observations, numbers, status)

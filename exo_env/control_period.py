@@ -167,7 +167,7 @@ def move(p):
     o, status = floats(p, PLANT.options), ints(p, PLANT.status)
     options = Options(o[0], o[1], o[2], o[3], o[4], o[5], o[6], int(o[7]), int(o[8]))
     end = (status[STATUS.step] + 1) * floats(p, PLANT.period)[0]
-    nothing = matrix(p, PLANT.terms)[:0]
+    nothing = matrix(p, PLANT.drive)[:0]
     code, _ = advance(inner(p, PLANT.model), inner(p, PLANT.world), options, end, nothing, 0)
     status[STATUS.code] = code
     return code
@@ -232,7 +232,7 @@ def observe(p, first):
 @compiled
 def judge(p):
     """Event and reward of the period that ends now; gives the reward."""
-    r, status, terms = floats(p, PLANT.reading), ints(p, PLANT.status), matrix(p, PLANT.terms)[0]
+    r, status, terms = floats(p, PLANT.reading), ints(p, PLANT.status), floats(p, PLANT.terms)
     if status[STATUS.code] != DONE:
         status[STATUS.event] = SOLVER
     else:

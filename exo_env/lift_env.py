@@ -293,11 +293,6 @@ class ElbowLiftEnv(gymnasium.Env):
         """The packed Plant of the present episode, for a batch."""
         return self._packed
 
-    @property
-    def table_values(self) -> Plant:
-        """Its arrays, for who looks at many worlds; they change with every step."""
-        return self._plant
-
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
         episode, world, status = self.episode, self.episode.world, self._plant.status
@@ -348,7 +343,7 @@ class ElbowLiftEnv(gymnasium.Env):
         """Of a step."""
         plant, r, happened = self._plant, self._readout, self.happened()
         info: dict[str, Any] = {
-            "reward_terms": dict(zip(TERMS, plant.terms[0].tolist(), strict=True)),
+            "reward_terms": dict(zip(TERMS, plant.terms.tolist(), strict=True)),
             "reward_weights": self._weights.copy(),
             "time": float(self.episode.times[plant.status[STATUS.step]]),
             "tracking_error_deg": math.degrees(r.error),

@@ -51,7 +51,7 @@ def plant_of(
         places=np.array([episode.names[name] for name in SENSORS], np.int64), y=zeros(len(episode.names)),
         reading=zeros(len(READING)), truth=_constants(episode), columns=observer.columns, sensors=observer.sensors,
         memory=observer.memory(), observation=zeros(n), action=zeros(2), before=zeros(2), weights=weights.numbers(),
-        limits=limits.numbers(), terms=zeros((1, len(TERMS))), reward=zeros(1), status=status,
+        limits=limits.numbers(), terms=zeros(len(TERMS)), reward=zeros(1), status=status,
     ))  # fmt: skip
 
 

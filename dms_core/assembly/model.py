@@ -317,15 +317,12 @@ class Model:
         return found
 
     def _recover(self, signals: np.ndarray, t, q, v, a, lam, behind) -> None:  # noqa: ANN001
-        recover(
-            self._dynamics.table, self._constraints.table, self._welds.table, signals, self._sensor_work.table, t, q, v,
-            a, lam, behind,
-        )  # fmt: skip
+        recover(self.sensing.table, self._welds.table, signals, t, q, v, a, lam, behind)
 
     def measure(self, signals: Signals, t, q, v, a, lam, behind) -> np.ndarray:  # noqa: ANN001
         """Sensors at given states with the given inputs: shape (k, n_y); behind[k] takes inputs behind a jump."""
         y = np.zeros((len(t), len(self.layout.outputs)))
-        self._measure(Packed(signals).table, t, q, v, a, lam, behind, y)
+        measure(self.sensing.table, Packed(signals).table, t, q, v, a, lam, behind, y)
         return y
 
     def measure_into(self, world: np.ndarray, t, q, v, a, lam, behind, y) -> None:  # noqa: ANN001
@@ -333,10 +330,7 @@ class Model:
         if self._reads_welds:
             lam = lam.copy()
             self._recover(inner(world, STATE.signals), t, q, v, a, lam, behind)
-        self._measure(inner(world, STATE.signals), t, q, v, a, lam, behind, y)
-
-    def _measure(self, signals: np.ndarray, t, q, v, a, lam, behind, y) -> None:  # noqa: ANN001
-        measure(self.sensing.table, signals, t, q, v, a, lam, behind, y)
+        measure(self.sensing.table, inner(world, STATE.signals), t, q, v, a, lam, behind, y)
 
     def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
         """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense."""

@@ -186,35 +186,17 @@ def _add_dynamic_rows(calls, e, w, n):
 
 
 @compiled
-def _add_dynamic(calls, e, w):
-    """Call e into r2."""
-    n = evaluate_dynamic(calls, e, w, 0)
-    _add_dynamic_rows(calls, e, w, n)
-
-
-@compiled
-def _add_constraint(calls, e, w):
-    """Call e into phi, phi_v, r2 and gmu."""
-    n = evaluate_constraint(calls, e, w, 0)
-    add_constraint_values(calls, e, w, n)
-    add_constraint_forces(calls, e, w, n)
-
-
-@compiled
-def evaluate_residual(dynamics, constraints, w, whole):
-    """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, without derivatives; `whole`: of welded bodies too."""
+def evaluate_residual(dynamics, constraints, w):
+    """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, of the calls that count as moving; no derivatives."""
     floats(w, WORK.r2)[:] = 0.0
     floats(w, WORK.gmu)[:] = 0.0
-    if whole:
-        for e in range(ints(dynamics, CALLS.kernel).shape[0]):
-            _add_dynamic(dynamics, e, w)
-        for e in range(ints(constraints, CALLS.kernel).shape[0]):
-            _add_constraint(constraints, e, w)
-        return
     for e in ints(dynamics, CALLS.moving):
-        _add_dynamic(dynamics, e, w)
+        n = evaluate_dynamic(dynamics, e, w, 0)
+        _add_dynamic_rows(dynamics, e, w, n)
     for e in ints(constraints, CALLS.moving):
-        _add_constraint(constraints, e, w)
+        n = evaluate_constraint(constraints, e, w, 0)
+        add_constraint_values(constraints, e, w, n)
+        add_constraint_forces(constraints, e, w, n)
 
 
 @compiled

@@ -348,17 +348,22 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
 
 
 @compiled
-def read_sensors(sensing, signals, t, q, v, a, lam, behind, y):
-    """y at one state, all vectors; `behind` takes the inputs behind a jump at t."""
-    w = inner(sensing, SENSING.work)
-    q_w, v_w, a_w, lam_w, y_w = (
-        floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam), floats(w, WORK.y),
-    )  # fmt: skip
+def put_state(w, signals, t, q, v, a, lam, behind):
+    """A state and its inputs into w; `behind` takes the inputs behind a jump at t."""
+    q_w, v_w, a_w, lam_w = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
     for i in range(q.shape[0]):
         q_w[i], v_w[i], a_w[i] = q[i], v[i], a[i]
     for i in range(lam.shape[0]):
         lam_w[i] = lam[i]
     evaluate_inputs(signals, t, not behind, w)
+
+
+@compiled
+def read_sensors(sensing, signals, t, q, v, a, lam, behind, y):
+    """y at one state, all vectors; `behind` takes the inputs behind a jump at t."""
+    w = inner(sensing, SENSING.work)
+    put_state(w, signals, t, q, v, a, lam, behind)
+    y_w = floats(w, WORK.y)
     evaluate_sensors(
         inner(sensing, SENSING.dynamics), inner(sensing, SENSING.constraints), inner(sensing, SENSING.sensors),
         inner(sensing, SENSING.composed), w,

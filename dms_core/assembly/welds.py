@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import fields, floats, indices, matrix
+from dms_core.assembly.arena import fields, floats, indices, inner, matrix
 from dms_core.assembly.layout import Layout
-from dms_core.assembly.residual import WORK, evaluate_inputs, evaluate_residual
+from dms_core.assembly.residual import WORK, evaluate_residual
+from dms_core.assembly.sensing import SENSING, put_state
 from dms_core.jit import compiled
 from dms_core.model.constraints.fixed import Fixed
 from dms_core.model.element import GROUND
@@ -83,20 +84,15 @@ def _fixed_bodies(layout: Layout) -> set[str]:
 
 
 @compiled
-def recover(dynamics, constraints, welds, signals, w, t, q, v, a, lam, behind):
+def recover(sensing, welds, signals, t, q, v, a, lam, behind):
     """Fill in lam[k] of the rows that were left out, at the states q[k], v[k], a[k] and times t[k]."""
-    q_w, v_w, a_w, lam_w = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
-    coordinates, rows = indices(welds, WELDS.coordinates), indices(welds, WELDS.rows)
-    inverse, r2 = matrix(welds, WELDS.inverse), floats(w, WORK.r2)
+    w, rows = inner(sensing, SENSING.work), indices(welds, WELDS.rows)
+    coordinates, inverse, r2 = indices(welds, WELDS.coordinates), matrix(welds, WELDS.inverse), floats(w, WORK.r2)
     for k in range(t.shape[0]):
-        for i in range(q.shape[1]):
-            q_w[i], v_w[i], a_w[i] = q[k, i], v[k, i], a[k, i]
-        for i in range(lam.shape[1]):
-            lam_w[i] = lam[k, i]
         for i in range(rows.shape[0]):
-            lam_w[rows[i]] = 0.0
-        evaluate_inputs(signals, t[k], not behind[k], w)
-        evaluate_residual(dynamics, constraints, w, True)
+            lam[k, rows[i]] = 0.0
+        put_state(w, signals, t[k], q[k], v[k], a[k], lam[k], behind[k])
+        evaluate_residual(inner(sensing, SENSING.dynamics), inner(sensing, SENSING.constraints), w)
         for i in range(rows.shape[0]):
             total = 0.0
             for j in range(rows.shape[0]):

@@ -125,11 +125,13 @@ def correction(m, s, c0):
 
 @compiled
 def largest_errors(s):
-    """Largest |phi| and |phi_q v + phi_t| of the last evaluation, over all rows, redundant ones included."""
+    """Largest |phi| and |phi_q v + phi_t| of the last evaluation over all rows, inf if any is not finite."""
     w = inner(s, STATE.w)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
     largest, largest_v = 0.0, 0.0
     for k in range(phi.shape[0]):
+        if not abs(phi[k]) + abs(phi_v[k]) < math.inf:
+            return math.inf, math.inf
         largest = max(largest, abs(phi[k]))
         largest_v = max(largest_v, abs(phi_v[k]))
     return largest, largest_v

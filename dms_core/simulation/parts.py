@@ -35,7 +35,7 @@ def _inputs(m, s):
 @compiled
 def _residual(m, s):
     """The residual at the present iterate."""
-    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w), False)
+    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w))
 
 
 @compiled

@@ -10,6 +10,7 @@ import pytest
 from dms_core.assembly.arena import Packed, inner
 from dms_core.assembly.model import Model
 from dms_core.assembly.residual import evaluate_inputs, evaluate_newton, evaluate_rates, evaluate_residual
+from dms_core.assembly.sensing import SENSING
 from dms_core.assembly.sparsity import newton_pattern, rate_pattern
 from dms_core.errors import AssemblyError, ModelError
 from dms_core.linear.rank import minimum_norm, minimum_norms
@@ -51,9 +52,7 @@ class Stage:
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Scaled residual (r1 / c0, r2 / c0^2, r3, r4 / c0) at the present state plus the scaled correction x."""
         apply(self.m, self.s, self.c0, x, 1.0)
-        evaluate_residual(
-            inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w), False
-        )
+        evaluate_residual(inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w))
         right_hand_side(self.m, self.s, self.c0)
         apply(self.m, self.s, self.c0, x, -1.0)
         return -self.simulation.state.b
@@ -161,7 +160,8 @@ def test_start_satisfies_every_equation(model):
     state = simulation.state
     x = (state.q[None], state.v[None], state.vd[None], state.lam[None])
     w.lam[:] = model.whole_multipliers(state.signals, np.zeros(1), *x, np.ones(1, bool))[0]
-    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w), True)
+    whole = model.sensing.table
+    evaluate_residual(inner(whole, SENSING.dynamics), inner(whole, SENSING.constraints), inner(s, STATE.w))
     # Forces are near 1e3 N.
     assert np.abs(w.r2[: model.n_q]).max() < 1e-9
     trajectory = simulate(model, 0.01, SolverOptions(rtol=1e-8))

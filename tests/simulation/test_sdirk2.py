@@ -137,7 +137,7 @@ def _residual(model: Model, run: Trajectory, k: int, inputs: int) -> np.ndarray:
     work.q[:n], work.v[:n], work.a[:n], work.lam[:] = run.q[k], run.v[k], run.a[k], run.lam[k]
     packed = Packed(work)
     evaluate_inputs(Packed(run.signals).table, run.t[inputs], False, packed.table)
-    evaluate_residual(model._dynamics.table, model._constraints.table, packed.table, True)
+    evaluate_residual(model._dynamics.table, model._constraints.table, packed.table)
     return work.r2[:n]
 
 
