@@ -47,7 +47,7 @@ def holding_tensions(ecosystem: Ecosystem, person: Person, load: float, angles: 
     """
     assert ecosystem.machine is not None
     arm, device = Arm(person), ecosystem.device
-    known, g = InternalModel(arm, ecosystem.machine, load), float(np.linalg.norm(arm.gravity))
+    known, g = InternalModel.of(arm, ecosystem.machine, load), float(np.linalg.norm(arm.gravity))
     moments = [known.resting_moment(angle) + device.own_moment(angle, g) for angle in map(float, angles)]
     return np.array(moments) / [device.moment_arm(AGONIST, angle) for angle in map(float, angles)]
 

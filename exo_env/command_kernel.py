@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.model.muscles.muscle import fibre_state, pennation_cosine
+from dms_core.model.muscles.muscle import fibre_at_rest, fibre_state, pennation_cosine, tendon_state
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
 from exo_env.jit import compiled
+
+TOE_GROWTH = math.expm1(TOE_SHAPE)
 
 
 class ArmTable(NamedTuple):
@@ -68,53 +70,78 @@ def dot(a, b):
 
 
 @compiled
-def turned(axis, angle, p):
-    """R p for a turn about the axis (Rodrigues' formula)."""
-    c, s = math.cos(angle), math.sin(angle)
-    n = (axis[0], axis[1], axis[2])
-    x = (p[0], p[1], p[2])
+def triple(x):
+    """A vector of three numbers as a tuple: rows of arrays are dear inside a loop."""
+    return x[0], x[1], x[2]
+
+
+@compiled
+def row(x, k):
+    """Row k as a tuple."""
+    return x[k, 0], x[k, 1], x[k, 2]
+
+
+@compiled
+def turned(n, c, s, x):
+    """R x of a triple, for a turn about n by an angle of that cosine and sine (Rodrigues' formula)."""
     w, along = cross(n, x), (1.0 - c) * dot(n, x)
     return c * x[0] + s * w[0] + along * n[0], c * x[1] + s * w[1] + along * n[1], c * x[2] + s * w[2] + along * n[2]
 
 
 @compiled
 def path_geometry(arm, muscle, angle):
-    """(length [m], moment arm -dl/dtheta [m]) of a muscle at an elbow angle [rad]."""
-    n, e = (arm.axis[0], arm.axis[1], arm.axis[2]), arm.elbow
+    """(length [m], moment arm -dl/dtheta [m]) of a muscle at an elbow angle [rad].
+
+    Only segments between forearm and ground change; the others are as long as in the frame of their points.
+    """
+    n, e = triple(arm.axis), triple(arm.elbow)
+    c, s = math.cos(angle), math.sin(angle)
     length, lever = 0.0, 0.0
-    before, slope_before = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(arm.first[muscle], arm.first[muscle + 1]):
-        p = arm.points[k]
-        x, slope = (p[0], p[1], p[2]), (0.0, 0.0, 0.0)
-        if arm.moving[k]:
-            r = turned(n, angle, p)
-            x, slope = (e[0] + r[0], e[1] + r[1], e[2] + r[2]), cross(n, r)
-        if k > arm.first[muscle]:
-            d = (x[0] - before[0], x[1] - before[1], x[2] - before[2])
-            change = (slope[0] - slope_before[0], slope[1] - slope_before[1], slope[2] - slope_before[2])
-            segment = math.sqrt(dot(d, d))
-            length += segment
-            lever -= dot(d, change) / segment
-        before, slope_before = x, slope
+    for k in range(arm.first[muscle] + 1, arm.first[muscle + 1]):
+        a, b = row(arm.points, k - 1), row(arm.points, k)
+        if arm.moving[k] == arm.moving[k - 1]:
+            d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+            length += math.sqrt(dot(d, d))
+            continue
+        if arm.moving[k - 1]:
+            a, b = b, a
+        r = turned(n, c, s, b)
+        d = (e[0] + r[0] - a[0], e[1] + r[1] - a[1], e[2] + r[2] - a[2])
+        segment = math.sqrt(dot(d, d))
+        length += segment
+        lever -= dot(d, cross(n, r)) / segment
     return length, lever
+
+
+@compiled
+def muscle_moment(arm, angle, activations):
+    """Moment that muscles at rest give about the elbow [Nm]; they do not exist where a tendon leaves no room."""
+    found = 0.0
+    for i in range(arm.muscles.shape[0]):
+        par = arm.muscles[i]
+        length, lever = path_geometry(arm, i, angle)
+        found += lever * tendon_state(par, length, fibre_at_rest(par, length, activations[i]))[0]
+    return found
 
 
 @compiled
 def needed_moment(arm, load, angle, rate, acceleration):
     """Moment that the muscles must give about the elbow axis [Nm]."""
-    n, g = (arm.axis[0], arm.axis[1], arm.axis[2]), (load.gravity[0], load.gravity[1], load.gravity[2])
+    n, g = triple(arm.axis), triple(load.gravity)
     g_size = math.sqrt(dot(g, g))
-    c, r = turned(n, angle, load.centre_of_mass), turned(n, angle, load.grip)
+    c, s = math.cos(angle), math.sin(angle)
+    grip = triple(load.grip)
+    centre, r = turned(n, c, s, triple(load.centre_of_mass)), turned(n, c, s, grip)
     slope = cross(n, r)
     bend = cross(n, slope)
-    e, p = arm.elbow, load.pulley
+    e, p = triple(arm.elbow), triple(load.pulley)
     d = (e[0] + r[0] - p[0], e[1] + r[1] - p[1], e[2] + r[2] - p[2])
     rope = math.sqrt(dot(d, d))
     rope_1 = dot(d, slope) / rope
     rope_2 = (dot(slope, slope) + dot(d, bend) - rope_1 * rope_1) / rope
     lifted = load.weight * rope_1 * (g_size + rope_1 * acceleration + rope_2 * rate * rate)
-    handle = load.handle * (g_size * slope[1] + dot(load.grip, load.grip) * acceleration)
-    own = load.inertia * acceleration - load.mass * dot(n, cross(c, g))
+    handle = load.handle * (g_size * slope[1] + dot(grip, grip) * acceleration)
+    own = load.inertia * acceleration - load.mass * dot(n, cross(centre, g))
     return own + lifted + handle
 
 
@@ -132,7 +159,7 @@ def tendon_length(par, force):
     if f <= 0.0:
         strain = 0.0
     elif f <= TOE_FORCE:
-        strain = e_toe / TOE_SHAPE * math.log1p(f * math.expm1(TOE_SHAPE) / TOE_FORCE)
+        strain = e_toe / TOE_SHAPE * math.log1p(f * TOE_GROWTH / TOE_FORCE)
     else:
         strain = e_toe + (f - TOE_FORCE) / k_lin
     return par[2] * (1.0 + strain)
@@ -242,7 +269,7 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         interval: between samples [s].
         course: psi, its rate and its acceleration, shape (n, 3).
         sweeps: largest number of iterations.
-        relaxation: share of a new tendon force that an iteration takes over.
+        relaxation: share of a new tendon force that an iteration takes over; the first takes all.
         settled: change of every activation that ends the iteration.
         moment: filled.
         activations: filled.
@@ -256,11 +283,12 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
             lengths[k, i], levers[k, i] = path_geometry(arm, i, course[k, 0])
             activations[k, i] = MINIMUM
     change, shortage = math.inf, 0.0
-    for _ in range(sweeps):
+    for k in range(sweeps):
         forces(arm, interval, lengths, tendon_force, activations, fibre, work[0], work[1])
         change, shortage = sweep(
-            arm, interval, moment, lengths, levers, relaxation, tendon_force, activations, work, moments
-        )
+            arm, interval, moment, lengths, levers, relaxation if k > 0 else 1.0, tendon_force, activations, work,
+            moments,
+        )  # fmt: skip
         if change < settled:
             break
     return shortage, change

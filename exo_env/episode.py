@@ -120,7 +120,7 @@ class Episode:
     def _known(self, load: float) -> InternalModel:
         """What somebody knows who expects this weight [kg]."""
         assert self.ecosystem.machine is not None
-        return InternalModel(self.arm, self.ecosystem.machine, load)
+        return InternalModel.of(self.arm, self.ecosystem.machine, load)
 
     def _holding_tension(self, start: float, activations: np.ndarray) -> float:
         """Agonist tension with which the arm rests at the start [N]; below 0 where the patient needs no help."""

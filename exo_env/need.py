@@ -75,8 +75,8 @@ class Need:
             device: whose lower link is carried.
             course: psi [rad], its rate and its acceleration at the control times, shape (n, 3).
         """
-        arm, load, able = known.arm_table(), known.load_table(), ability(patient, known)
-        g = float(np.linalg.norm(known.arm.gravity))
+        arm, load, able = known.arm, known.load, ability(patient, known)
+        g = float(np.linalg.norm(load.gravity))
         needed = np.zeros(len(course))
         needed_moments(arm, load, course, needed)
         needed = np.maximum(needed, 0.0)

@@ -13,6 +13,7 @@ from dms_core import Model, SolverOptions, Trajectory, simulate
 from dms_core.errors import InputError
 from dms_core.model import MinimumJerk
 from exo_env.ecosystem import Ecosystem, Proprioception
+from exo_env.gym_machine import GymMachine
 from exo_env.human import Arm
 from exo_env.motor_command import InternalModel, MotorCommand, plan
 from exo_env.settings import Settings
@@ -105,8 +106,7 @@ def build(scenario: Scenario, exercise: Exercise, ecosystem: Ecosystem | None = 
     felt = exercise.proprioception
     scaled = felt.changed(gain=felt.gain * scenario.maximum_activation)
     joined = base.changed(weight=scenario.weight, proprioception=scaled)
-    known = InternalModel(Arm(base.person), base.machine, scenario.expected_weight)
-    command = _planned(known, exercise)
+    command = _planned(Arm(base.person), base.machine, scenario.expected_weight, exercise)
     system = joined.system(
         float(np.radians(exercise.angles_deg[0])),
         exercise.reference,
@@ -118,9 +118,9 @@ def build(scenario: Scenario, exercise: Exercise, ecosystem: Ecosystem | None = 
 
 
 @lru_cache(maxsize=16)
-def _planned(model: InternalModel, exercise: Exercise) -> MotorCommand:
+def _planned(arm: Arm, machine: GymMachine, expected_weight: float, exercise: Exercise) -> MotorCommand:
     """The command; the scenarios share it as long as the subject expects the same."""
-    return plan(model, exercise.course, exercise.duration)
+    return plan(InternalModel.of(arm, machine, expected_weight), exercise.course, exercise.duration)
 
 
 def run(

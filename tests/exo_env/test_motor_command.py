@@ -20,7 +20,7 @@ from exo_env.scenarios import build, load_scenarios
 def command():
     exercise, _ = load_scenarios()
     machine = GymMachine.from_config("gym_machine/pulley.yaml")
-    return plan(InternalModel(Arm(), machine, 1.0), exercise.course, exercise.duration)
+    return plan(InternalModel.of(Arm(), machine, 1.0), exercise.course, exercise.duration)
 
 
 @pytest.mark.parametrize("wanted", [5.0, 0.3, -4.0])
@@ -45,10 +45,10 @@ def test_a_moment_out_of_reach_is_reported():
 
 
 def test_a_command_that_does_not_settle_is_an_error(monkeypatch):
-    """About 30 iterations are needed; three are too few."""
+    """Six iterations are needed; three are too few."""
     monkeypatch.setattr(motor_command, "SWEEPS", 3)
     exercise, _ = load_scenarios()
-    model = InternalModel(Arm(), GymMachine.from_config("gym_machine/pulley.yaml"), 1.0)
+    model = InternalModel.of(Arm(), GymMachine.from_config("gym_machine/pulley.yaml"), 1.0)
     with pytest.raises(SimulationError, match="does not settle: after 3 iterations .* still changes by 0"):
         plan(model, exercise.course, exercise.duration)
 
@@ -89,7 +89,7 @@ def test_a_coarse_table_of_times_gives_the_same_command(command):
     exercise, _ = load_scenarios()
     machine = GymMachine.from_config("gym_machine/pulley.yaml")
     times = np.linspace(0.0, exercise.duration, 111)
-    coarse = plan_course(InternalModel(Arm(), machine, 1.0), times, np.array([exercise.course(t) for t in times]))
+    coarse = plan_course(InternalModel.of(Arm(), machine, 1.0), times, np.array([exercise.course(t) for t in times]))
     for k in range(6):
         # Linear between points 50 ms apart, along a movement whose fastest part lasts a second; 0.0018 was measured.
         drawn = np.interp(command.times, times, coarse.activations[:, k])

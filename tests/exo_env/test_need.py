@@ -21,7 +21,7 @@ COURSE = Repetition().course(TIMES)
 
 def known(patient=None, load=1.0):
     patient = patient or Patient()
-    return InternalModel(Arm(patient.person), GymMachine.from_config("gym_machine/pulley.yaml"), load)
+    return InternalModel.of(Arm(patient.person), GymMachine.from_config("gym_machine/pulley.yaml"), load)
 
 
 def test_moment_of_muscles_is_that_of_the_motor_command():
@@ -57,7 +57,7 @@ def test_ability_falls_with_weakness_and_load_and_stays_within_its_range():
 
 def test_who_can_do_nothing_lacks_everything_and_who_can_do_all_only_the_device():
     model = known()
-    g = np.linalg.norm(model.arm.gravity)
+    g = np.linalg.norm(model.load.gravity)
     own = np.array([DEVICE.own_moment(a, g) for a in COURSE[:, 0]])
     needed = plan_course(model, TIMES, COURSE).moment
     able = Need.of(Patient(), model, DEVICE, COURSE)

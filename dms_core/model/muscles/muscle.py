@@ -21,8 +21,8 @@ from typing import ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.optimize import brentq
 
+from dms_core.bracket import narrowed, trial
 from dms_core.errors import ModelError
 from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
@@ -46,6 +46,8 @@ from dms_core.model.ropes.path import (
 
 LEAST_COSINE = 0.1
 """Pennation is not let beyond acos(0.1), about 84 degrees."""
+MOST_TRIALS = 200
+"""Evaluations after which a search for a zero is as good as it gets."""
 PATH_NUMBERS = 15
 """Index in `par` where the path begins; before it F0, L0, Ls, height, vmax [m/s], tau_act, tau_deact, the seven
 numbers of the curves, then the reflex gain."""
@@ -109,6 +111,33 @@ def fibre_state(par, fibre, rate, a):
         F0 * fl * (fv + a * fv_a),
         F0 * fp_l / par[1],
     )
+
+
+@compiled
+def surplus(par, length, fibre, a):
+    """Force of a fibre at rest along the tendon, less that of the tendon [N]."""
+    active, passive = fibre_state(par, fibre, 0.0, a)[:2]
+    return (active + passive) * pennation_cosine(par, fibre)[0] - tendon_state(par, length, fibre)[0]
+
+
+@compiled
+def fibre_at_rest(par, length, a):
+    """Fibre length [m] at which `surplus` is 0, to rounding; 0.0 where the tendon leaves no room for it."""
+    height, room = par[3], length - par[2]
+    low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[1]) * (1.0 + 1e-12)
+    # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
+    high = math.hypot(max(room, 0.0), height)
+    if room <= 0.0 or high <= low:
+        return 0.0
+    f_low, f_high, moved = surplus(par, length, low, a), surplus(par, length, high, a), 0.0
+    if f_low >= 0.0:
+        return 0.0
+    for _ in range(MOST_TRIALS):
+        x = trial(low, f_low, high, f_high)
+        if not low < x < high:
+            break
+        low, f_low, high, f_high, moved = narrowed(low, f_low, high, f_high, moved, x, surplus(par, length, x, a))
+    return low if -f_low < f_high else high
 
 
 @compiled
@@ -271,23 +300,14 @@ class ThelenMuscle(Force):
         Raises:
             ModelError: the tendon slack length leaves no room for the fibre within `length_mt`.
         """
-        par = np.array(self.numbers())
-        height, room = par[3], length_mt - self.tendon_slack_length
-        shortest = max(height / math.sqrt(1.0 - LEAST_COSINE**2), 1e-3 * self.optimal_fibre_length) * (1.0 + 1e-12)
-
-        def surplus(fibre: float) -> float:
-            active, passive, *_ = fibre_state(par, fibre, 0.0, activation)
-            return (active + passive) * pennation_cosine(par, fibre)[0] - tendon_state(par, length_mt, fibre)[0]
-
-        # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
-        longest = math.hypot(max(room, 0.0), height)
-        if room <= 0.0 or longest <= shortest or surplus(shortest) >= 0.0:
+        found = fibre_at_rest(np.array(self.numbers()), length_mt, activation)
+        if found == 0.0:
             raise ModelError(
                 f"{self.kind} '{self.name}': its path is {length_mt:.6g} m long, the tendon slack length is "
                 f"{self.tendon_slack_length:.6g} m; that leaves no room for a fibre under tension. "
                 "Shorten the tendon slack length or move the path points apart."
             )
-        return float(brentq(surplus, shortest, longest, xtol=1e-15, rtol=1e-14, maxiter=200))
+        return float(found)
 
     def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
         """Start of the owned coordinates: fibre in equilibrium at rest, activation with its rate.
