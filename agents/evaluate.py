@@ -20,7 +20,6 @@ from agents.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, interqu
 from dms_core.errors import InputError
 from exo_env.need import ABLE
 from exo_env.population import Source, population
-from exo_env.repetition import Repetition
 
 ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
 OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
@@ -136,7 +135,7 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
     observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
     info = drawn
     acting.reset(env)
-    record = Record(Repetition(**drawn["reference"]), world.period)
+    record = Record(world.episode.repetition, world.period)
     record.add(world.readings())
     over = False
     while not over:

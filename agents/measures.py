@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -98,17 +99,18 @@ def positive_work(times: np.ndarray, power: np.ndarray) -> float:
 
 
 def smoothness(repetition: Repetition, times: np.ndarray, rate: np.ndarray, period: float) -> float:
-    """Mean SPARC of lift and return, each with the rest behind it, in which a late arm still arrives.
+    """Mean SPARC of lifts and returns, each with the rest behind it, in which a late arm still arrives.
 
     Args:
-        repetition: says when the moves are.
+        repetition: says when the moves are, and how often.
         times: [s], shape (n,).
         rate: of the elbow [rad/s], shape (n,).
         period: between two times [s].
     """
-    lift = repetition.rest
-    back = lift + repetition.duration + repetition.pause
-    parts = (rate[(times >= lift) & (times < back)], rate[times >= back])
+    lifts = repetition.rest + repetition.interval * np.arange(repetition.count)
+    backs = lifts + repetition.duration + repetition.pause
+    edges = [*np.stack([lifts, backs], axis=1).flat, math.inf]
+    parts = [rate[(times >= a) & (times < b)] for a, b in pairwise(edges)]
     found = [sparc(np.abs(part), 1.0 / period) for part in parts]
     return float(np.mean([x for x in found if math.isfinite(x)])) if np.isfinite(found).any() else math.nan
 

@@ -26,13 +26,13 @@ from exo_env.observations import Observer, Slice
 from exo_env.plant import plant_of
 from exo_env.population import Source, population
 from exo_env.readout import Readout
-from exo_env.repetition import Repetition, Repetitions
+from exo_env.repetition import MOST_REPETITIONS, Repetition, Repetitions
 from exo_env.rewards import TERMS, Weights
 from exo_env.scene import Scene
 
 OPTIONS = ("patient", "load", "reference", "initial_angle_deg")
-SMALLEST_STEP, MOST_STEPS = 1e-9, 500_000
-"""Of the solver in one episode: a run that needs less [s], or more, has failed."""
+SMALLEST_STEP, MOST_STEPS, TIME = 1e-9, 500_000, 6.0
+"""Of the solver in one episode: a run that needs less [s], or more, has failed. Of one repetition [s]."""
 
 
 class ElbowLiftEnv(gymnasium.Env):
@@ -44,8 +44,8 @@ class ElbowLiftEnv(gymnasium.Env):
     differential-algebraic equations that advances with its own steps; one `step` is one control period (50 Hz). Over
     it, commands and the patient's excitations go linearly from their last values to the new ones. One episode is one
     repetition: rest, flexion, pause, return, of random amplitude, duration and pause, with a random patient and load.
-    The patient is to do as much as possible, the device no more than is needed: effort is forgotten where the device
-    leaves no error.
+    With `repetitions` it is done several times, while fatigue and effort go on. The patient is to do as much as
+    possible, the device no more than is needed: effort is forgotten where the device leaves no error.
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`. Numbers beyond -1 to 1 are clipped; a number that is not finite, or another shape, is
@@ -107,8 +107,8 @@ class ElbowLiftEnv(gymnasium.Env):
     ## Episode End
     Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
     elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
-    `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), at whatever control rate; so the
-    registration has no `max_episode_steps`.
+    `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), or as long for each of
+    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`.
 
     ## Arguments
     All by keyword, all JSON.
@@ -126,7 +126,8 @@ class ElbowLiftEnv(gymnasium.Env):
     | `reward_weights`   | `None`           | changes of the weights                                                   |
     | `limits`           | `None`           | changes of lowest_deg, highest_deg, tension, reaction                    |
     | `control_rate`     | 50               | [Hz]                                                                     |
-    | `episode_duration` | 6                | [s]                                                                      |
+    | `episode_duration` | `None`           | [s]; `None`: 6 s for each repetition                                     |
+    | `repetitions`      | 1                | one begins every `episode_duration / repetitions`, or after the last one |
     | `rtol`             | `None`           | of the solver; `None` keeps the angle within 0.06 deg                    |
     | `render_mode`      | `None`           | `"human"` or `"rgb_array"`                                               |
 
@@ -153,23 +154,26 @@ class ElbowLiftEnv(gymnasium.Env):
         reward_weights: Mapping[str, float] | None = None,
         limits: Mapping[str, float] | None = None,
         control_rate: float = 50.0,
-        episode_duration: float = 6.0,
+        episode_duration: float | None = None,
+        repetitions: int = 1,
         rtol: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = choices(self.metadata["render_modes"])
             raise InputError(f"render_mode = {render_mode!r}; one of {modes} is wanted, or None.")
+        if type(repetitions) is not int or not 1 <= repetitions <= MOST_REPETITIONS:
+            raise InputError(f"repetitions = {repetitions!r}; a whole number from 1 to {MOST_REPETITIONS} is wanted.")
         for name, value, low, high in (
             ("control_rate", control_rate, 5.0, 1000.0),
             ("episode_duration", episode_duration, 0.1, 120.0),
             ("rtol", rtol, 1e-8, 0.2),
         ):
-            if not (name == "rtol" and value is None) and not within(value, low, high):
+            if not (name != "control_rate" and value is None) and not within(value, low, high):
                 raise InputError(f"{name} = {value!r}; a number from {low:g} to {high:g} is wanted.")
-        self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": round(control_rate)}
-        self.period, self.duration = 1.0 / control_rate, float(episode_duration)
+        self.render_mode, self.metadata = render_mode, {**type(self).metadata, "render_fps": round(control_rate)}
+        self.period, self.duration = 1.0 / control_rate, float(episode_duration or TIME * repetitions)
+        self._often = {"count": repetitions, "every": self.duration / repetitions}
         self.population = population(patient)
         self.load = load_distribution(load)
         self.repetitions = Repetitions.of(reference)
@@ -187,7 +191,7 @@ class ElbowLiftEnv(gymnasium.Env):
             "patient": patient, "load": load, "exoskeleton": exoskeleton, "reference": reference,
             "action_mode": action_mode, "drive_settings": drive_settings, "observation": observation, "noise": noise,
             "reward_weights": reward_weights, "limits": limits, "control_rate": control_rate,
-            "episode_duration": episode_duration, "rtol": rtol, "render_mode": render_mode,
+            "episode_duration": episode_duration, "repetitions": repetitions, "rtol": rtol, "render_mode": render_mode,
         }  # fmt: skip
         self._episode: Episode | None = None
         self._over = False
@@ -242,6 +246,7 @@ class ElbowLiftEnv(gymnasium.Env):
         low, high = self.limits.lowest_deg, self.limits.highest_deg
         if not within(start_deg, low, high):
             raise InputError(f"initial_angle_deg = {start_deg!r}; a number from {low:g} to {high:g} is wanted.")
+        repetition = repetition.model_copy(update=self._often)
         self._episode = self._simulated(patient, load, repetition, math.radians(start_deg))
 
     def _simulated(self, patient: Any, load: float, repetition: Repetition, start: float) -> Episode:

@@ -1,4 +1,4 @@
-"""One repetition of the exercise: rest, flexion, pause, return, each move of minimum jerk (Flash and Hogan 1985).
+"""Repetitions of the exercise: rest, flexion, pause, return, each move of minimum jerk (Flash and Hogan 1985).
 
 Angles stay between 20 and 100 degrees, where the muscles' straight lines have leverage (human.py). Which angles,
 durations and pauses occur is a distribution a field, as in a population of patients; all of them are assumed.
@@ -19,16 +19,22 @@ from exo_env.settings import Settings
 
 LOWEST, HIGHEST = 20.0, 100.0
 """Elbow angles between which the exercise stays [deg]."""
+MOST_REPETITIONS = 20
 
 
 class Repetition(Settings):
-    """One movement of the reference."""
+    """One movement of the reference, done `count` times: one begins `every` so often, or when the last one is over.
+
+    The last two fields are the episode's, not the movement's, and so not in `model_dump()`.
+    """
 
     start_deg: float = Field(default=25.0, ge=LOWEST, le=HIGHEST, description="angle at rest [deg]")
     amplitude_deg: float = Field(default=60.0, gt=0.0, le=HIGHEST - LOWEST, description="of the flexion [deg]")
     rest: float = Field(default=0.4, ge=0.0, le=10.0, description="before the flexion [s]")
     duration: float = Field(default=2.0, ge=0.3, le=20.0, description="of each of the two moves [s]")
     pause: float = Field(default=0.5, gt=0.0, le=10.0, description="at the top [s]")
+    count: int = Field(default=1, ge=1, le=MOST_REPETITIONS, exclude=True, description="times that it is done")
+    every: float = Field(default=0.0, ge=0.0, exclude=True, description="from one begin to the next, at least [s]")
 
     @model_validator(mode="after")
     def _within_leverage(self):
@@ -43,8 +49,17 @@ class Repetition(Settings):
     def signal(self) -> MinimumJerk:
         """psi(t) [rad]."""
         low, high = np.radians(self.start_deg), np.radians(self.start_deg + self.amplitude_deg)
-        times = np.cumsum([self.rest, self.duration, self.pause, self.duration])
-        return MinimumJerk(times=tuple(times), values=(low, high, high, low))
+        move = (self.duration, self.pause, self.duration)
+        rests = [self.rest, *[self.interval - sum(move)] * (self.count - 1)]
+        times, values = np.cumsum([t for rest in rests for t in (rest, *move)]), (low, high, high, low) * self.count
+        # Where there is no rest, a return ends when the next flexion begins.
+        kept = np.flatnonzero(np.diff(times, prepend=-1.0) > 0.0)
+        return MinimumJerk(times=tuple(times[kept]), values=tuple(values[k] for k in kept))
+
+    @property
+    def interval(self) -> float:
+        """From the begin of one to the begin of the next [s]."""
+        return max(self.every, self.rest + 2.0 * self.duration + self.pause)
 
     def course(self, times: np.ndarray) -> np.ndarray:
         """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at times [s] in rising order, shape (n, 3)."""
@@ -73,7 +88,7 @@ class Repetitions(Settings):
     def _possible(self):
         """Both ends of every spread must be repetitions."""
         for end in (0, -1):
-            Repetition(**{name: self._spread(name).limits()[end] for name in Repetition.model_fields})
+            Repetition(**{name: self._spread(name).limits()[end] for name in type(self).model_fields})
         return self
 
     @classmethod
@@ -82,10 +97,10 @@ class Repetitions(Settings):
         if isinstance(source, Repetitions):
             return source
         if isinstance(source, Repetition):
-            return cls(**dict(source))
+            return cls(**source.model_dump())
         if source is None or isinstance(source, Mapping):
             return cls(**(source or {}))
-        fields = ", ".join(Repetition.model_fields)
+        fields = ", ".join(cls.model_fields)
         raise InputError(f"reference = {source!r}; a mapping with some of {fields} is wanted, or None.")
 
     def _spread(self, name: str) -> Any:
@@ -96,4 +111,4 @@ class Repetitions(Settings):
 
     def sample(self, generator: np.random.Generator) -> Repetition:
         """A repetition; one number is drawn for each field."""
-        return Repetition(**{name: self._spread(name).quantile(generator.random()) for name in Repetition.model_fields})
+        return Repetition(**{name: self._spread(name).quantile(generator.random()) for name in type(self).model_fields})

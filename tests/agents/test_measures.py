@@ -80,6 +80,9 @@ def test_smoothness_takes_lift_and_return_apart():
     # As one movement it would have two peaks; apart each is a reach and a rest.
     assert smoothness(r, times, rate, 0.02) == pytest.approx(-1.41, abs=0.02)
     assert sparc(np.abs(rate), 50.0) < -2.0
+    often = r.model_copy(update={"count": 3, "every": 4.0})
+    times = np.arange(0.0, 12.0, 0.02)
+    assert smoothness(often, times, often.course(times)[:, 1], 0.02) == pytest.approx(-1.41, abs=0.02)
 
 
 def test_positive_work():
