@@ -292,3 +292,24 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         if change < settled:
             break
     return shortage, change
+
+
+@compiled
+def drawn(table, rows, interval, period, out):
+    """Linear interpolation of a table in time.
+
+    Args:
+        table: values, shape (k, m).
+        rows: row that holds at each multiple of the interval, shape (n,).
+        interval: [s].
+        period: from one row of `out` to the next [s].
+        out: shape (p, m).
+    """
+    last = rows.shape[0] - 1
+    for k in range(out.shape[0]):
+        x = k * period / interval
+        i = min(int(x), last - 1)
+        part = min(x - i, 1.0)
+        for j in range(out.shape[1]):
+            near, far = table[rows[i], j], table[rows[i + 1], j]
+            out[k, j] = near + part * (far - near)

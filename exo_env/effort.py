@@ -150,6 +150,11 @@ def reset_effort(par, state, n, period, wanted, phase):
             state[STATE.memory + (RING.drive + k) * n + i] = drive
 
 
+def start_excitations(state: np.ndarray, n: int) -> np.ndarray:
+    """Excitations behind `reset_effort`, without tremor [-], shape (6,): activations of a consistent start."""
+    return np.clip(state[STATE.memory + RING.drive * n :: n][:N], MINIMUM, 1.0)
+
+
 @compiled
 def remember(par, state, n, wanted, error, stretch):
     """Takes the samples of a new period into the rings."""
@@ -231,8 +236,7 @@ class Effort:
         """
         phase = self.generator.uniform(0.0, 2.0 * math.pi)
         reset_effort(self.numbers, self.state, self._samples, self.period, _activations(wanted), phase)
-        drive = self.state[STATE.memory + RING.drive * self._samples :: self._samples][:N]
-        return np.clip(drive, MINIMUM, 1.0)
+        return start_excitations(self.state, self._samples)
 
     def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0) -> np.ndarray:
         """Excitations at the end of the coming control period [-], shape (6,).

@@ -5,16 +5,18 @@ The rope holds both ways in the equations; its tension is reported, and a negati
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydantic import Field
-from scipy.optimize import brentq
 
 from dms_core.errors import InputError
 from dms_core.model import GROUND, JointSpringDamper, PathPoint, Revolute, RigidBody, RopeLength, Slider
 from dms_core.model.element import Constraint, Force, Vector
-from dms_core.model.frames import quaternion, rotation_matrix
+from dms_core.model.frames import quaternion
 from exo_env.human import Arm
 from exo_env.settings import Settings
+from exo_env.start_kernel import handle_angle
 
 HANDLE, WEIGHT, ROPE, GRIP_JOINT = "handle", "weight", "gym_rope", "grip"
 
@@ -39,6 +41,32 @@ class GymMachine(Settings):
     weight_inertia: float = Field(gt=0.0, description="inertia over mass of the weight [m^2]")
 
 
+def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> None:
+    """Refuses a machine whose rope an arm could bring to a pulley: its length has a kink there.
+
+    Args:
+        machine: the machine.
+        elbow: centre of the elbow in ground axes [m].
+        grip: in the forearm's frame [m].
+
+    Raises:
+        InputError: an end of the rope could reach a pulley, and nothing stops the weight.
+    """
+    # The rope's end is in a disc of twice this width.
+    reach = math.hypot(*grip) + machine.handle.length
+    room, from_low = machine.high_pulley[1] - machine.weight_start, math.dist(elbow, machine.low_pulley)
+    if room <= 2.0 * reach:
+        raise InputError(
+            f"high_pulley = {machine.high_pulley} is {room:.4g} m above weight_start = {machine.weight_start}; the "
+            f"weight can rise by {2.0 * reach:.4g} m, and the pulley must be higher."
+        )
+    if from_low <= reach:
+        raise InputError(
+            f"low_pulley = {machine.low_pulley} is {from_low:.4g} m from the elbow, and the handle reaches "
+            f"{reach:.4g} m; it must be out of reach."
+        )
+
+
 class LoadedMachine:
     """A machine with a weight, its handle in a hand.
 
@@ -48,46 +76,23 @@ class LoadedMachine:
         mass: of the weight [kg].
 
     Raises:
-        InputError: an end of the rope could reach a pulley; its length has a kink there, and nothing stops the weight.
+        InputError: see check_reach.
     """
 
     def __init__(self, machine: GymMachine, arm: Arm, mass: float) -> None:
         self.machine, self.arm, self.mass = machine, arm, mass
-        reach, from_low = self._reach(), float(np.linalg.norm(arm.elbow - machine.low_pulley))
-        room = machine.high_pulley[1] - machine.weight_start
-        if room <= 2.0 * reach:
-            raise InputError(
-                f"high_pulley = {machine.high_pulley} is {room:.4g} m above weight_start = {machine.weight_start}; the "
-                f"weight can rise by {2.0 * reach:.4g} m, and the pulley must be higher."
-            )
-        if from_low <= reach:
-            raise InputError(
-                f"low_pulley = {machine.low_pulley} is {from_low:.4g} m from the elbow, and the handle reaches "
-                f"{reach:.4g} m; it must be out of reach."
-            )
-
-    def _reach(self) -> float:
-        """Largest distance of the rope's end from the elbow [m]; the end is in a disc of twice this width."""
-        return float(np.linalg.norm(self.arm.grip)) + self.machine.handle.length
+        check_reach(machine, arm.elbow, arm.grip)
 
     def rest_angle(self, flexion: float) -> float:
         """Angle of the handle about the elbow axis, from hanging straight down, at which it rests [rad].
 
         The rope pulls with the weight's force, the handle has its own, and the grip turns freely.
         """
-        m, g = self.machine, np.array(self.arm.gravity)
+        m = self.machine
         grip = self.arm.elbow + self.arm.rotation(flexion) @ self.arm.grip
-
-        def moment(angle: float) -> float:
-            down = rotation_matrix(quaternion(self.arm.axis, angle)) @ (0.0, -1.0, 0.0)
-            pull = np.array(m.low_pulley) - grip - m.handle.length * down
-            tension = self.mass * np.linalg.norm(g) * pull / np.linalg.norm(pull)
-            weight = m.handle.mass * m.handle.centre_of_mass * np.cross(down, g)
-            return float(self.arm.axis @ (m.handle.length * np.cross(down, tension) + weight))
-
-        towards = np.array(m.low_pulley) - grip
-        about = float(np.arctan2(towards[0], -towards[1]))
-        return float(brentq(moment, about - 1.5, about + 1.5, xtol=1e-14))
+        to_pulley = np.array(m.low_pulley) - grip
+        numbers = np.array([m.handle.mass, m.handle.length, m.handle.centre_of_mass])
+        return handle_angle(tuple(self.arm.axis), self.arm.gravity, tuple(to_pulley), numbers, float(self.mass))
 
     def bodies(self, flexion: float) -> list[RigidBody]:
         """Handle at rest in the hand of an elbow at `flexion` [rad], and the weight."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import gymnasium
@@ -17,17 +18,17 @@ from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
 from dms_core.simulation.step_control import DONE, MATRIX_SINGULAR
 from exo_env.actions import checked_action, drive
-from exo_env.control_period import READING, STATUS, Plant, begin, finish, run_period
+from exo_env.control_period import READING, STATUS, Plant, finish, run_period
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import NOTHING, SOLVER, Limits, event
 from exo_env.lift_settings import load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
-from exo_env.plant import plant_of
 from exo_env.population import Source, population
 from exo_env.readout import Readout
-from exo_env.repetition import MOST_REPETITIONS, Repetition, Repetitions
+from exo_env.repetition import MOST_REPETITIONS, Repetitions
 from exo_env.rewards import TERMS, Weights
+from exo_env.rig import Rig
 from exo_env.scene import Scene
 
 OPTIONS = ("patient", "load", "reference", "initial_angle_deg")
@@ -220,7 +221,6 @@ class ElbowLiftEnv(gymnasium.Env):
         self._over, self._episode = True, None
         self._begin(options or {})
         self._over = False
-        begin(self._packed.table)
         if self.render_mode == "human":
             self.render()
         return self._plant.observation.astype(np.float32), self._start_info()
@@ -247,18 +247,26 @@ class ElbowLiftEnv(gymnasium.Env):
         if not within(start_deg, low, high):
             raise InputError(f"initial_angle_deg = {start_deg!r}; a number from {low:g} to {high:g} is wanted.")
         repetition = repetition.model_copy(update=self._often)
-        self._episode = self._simulated(patient, load, repetition, math.radians(start_deg))
+        self._episode = self.rig.begin(patient, load, repetition, math.radians(start_deg), self.np_random)
+        self._readout = Readout(self._episode, self._plant)
 
-    def _simulated(self, patient: Any, load: float, repetition: Repetition, start: float) -> Episode:
-        episode = Episode(
-            ecosystem=self.ecosystem.changed(weight=load), mode=self.action_mode, drive=self.drive, patient=patient,
-            repetition=repetition, start=start, period=self.period, duration=self.duration, generator=self.np_random,
+    @cached_property
+    def rig(self) -> Rig:
+        """The world, in which all episodes take place."""
+        return Rig(
+            self.ecosystem, self.action_mode, self.drive, period=self.period, duration=self.duration,
+            repetitions=int(self._often["count"]), observer=self.observer, weights=self.weights, limits=self.limits,
             options=self.solver,
         )  # fmt: skip
-        self._packed = plant_of(episode, self.observer, self.weights, self.limits, self.np_random)
-        self._plant: Plant = self._packed.values
-        self._readout = Readout(episode, self._plant)
-        return episode
+
+    @property
+    def packed(self) -> Packed:
+        """The packed Plant, for a batch."""
+        return self.rig.packed
+
+    @property
+    def _plant(self) -> Plant:
+        return self.rig.plant
 
     @property
     def episode(self) -> Episode:
@@ -285,18 +293,13 @@ class ElbowLiftEnv(gymnasium.Env):
         if self._over:
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
         plant, status = self._plant, self._plant.status
-        if run_period(self._packed.table, used) != DONE:
+        if run_period(self.rig.packed.table, used) != DONE:
             self.rescue()
         terminated, truncated = bool(status[STATUS.event] != NOTHING), bool(status[STATUS.step] == status[STATUS.steps])
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
         return plant.observation.astype(np.float32), float(plant.reward[0]), terminated, truncated, self._info()
-
-    @property
-    def packed(self) -> Packed:
-        """The packed Plant of the present episode, for a batch."""
-        return self._packed
 
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
@@ -307,11 +310,9 @@ class ElbowLiftEnv(gymnasium.Env):
         if world.result is Result.INTERRUPTED:
             raise KeyboardInterrupt
         if world.result is Result.SUCCESS:
-            self._plant.status[STATUS.code] = DONE
-            self._plant = self._plant._replace(model=world.tables, world=world.packed)
-            self._packed = Packed(self._plant)
-            self._readout = Readout(episode, self._plant)
-        finish(self._packed.table)
+            status[STATUS.code] = DONE
+            self.rig.follow_world()
+        finish(self.rig.packed.table)
 
     def happened(self) -> str | None:
         """The sentence on what ended the episode, or None."""
@@ -338,7 +339,7 @@ class ElbowLiftEnv(gymnasium.Env):
         e = self.episode
         return {
             "patient": e.patient.model_dump(),
-            "load": float(e.ecosystem.weight),
+            "load": e.load,
             "ability": e.need.ability,
             "reference": e.repetition.model_dump(),
             "initial_angle_deg": math.degrees(self._readout.angle),
@@ -353,7 +354,7 @@ class ElbowLiftEnv(gymnasium.Env):
             "time": float(self.episode.times[plant.status[STATUS.step]]),
             "tracking_error_deg": math.degrees(r.error),
             "device_share": r[READING.share],
-            "effort": self.episode.effort.effort,
+            "effort": self.episode.effort,
             "elbow_reaction": r[READING.reaction],
             "solver_failed": bool(plant.status[STATUS.event] == SOLVER),
         }

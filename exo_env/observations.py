@@ -122,6 +122,8 @@ _STARTS = np.concatenate([[0], np.cumsum([len(c.labels) for c in _ALL])])
 TRUTH_SIZE = int(_STARTS[-1])
 TRUTH: Any = namedtuple("TRUTH", [c.name for c in _ALL])(*_STARTS[:-1].tolist())
 """Place of each channel in the vector of all."""
+OF_PATIENT = tuple((int(getattr(TRUTH, c.name)), c.name) for c in patient_channels())
+"""Place and field of each number of the patient in it."""
 DEVIATION, QUANTUM, SCALE, LOW, HIGH, WHOLE, PART = range(7)
 
 
@@ -193,15 +195,6 @@ class Observer:
     def memory(self) -> np.ndarray:
         """For the past readings of one world, shape (depth, size)."""
         return np.zeros((int(self.sensors[:, WHOLE].max()) + 2, self.size))
-
-
-def truth_of(reading: Mapping[str, Any]) -> np.ndarray:
-    """Values of all channels [unit of the channel] from those that are given by name; the rest is 0."""
-    found = np.zeros(TRUTH_SIZE)
-    for name, values in reading.items():
-        start = getattr(TRUTH, name)
-        found[start : start + np.size(values)] = values
-    return found
 
 
 @compiled

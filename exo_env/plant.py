@@ -1,15 +1,17 @@
-"""The arrays of one episode, put together for compiled code (control_period.py)."""
+"""The arrays of a world and of what acts on it, put together for compiled code (control_period.py)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from dms_core.assembly.arena import Packed
+from dms_core.simulation.dynamics import World
 from exo_env.control_period import READING, STATUS, Plant
-from exo_env.episode import Episode
+from exo_env.effort import state_size
 from exo_env.events import Limits
-from exo_env.human import MUSCLES, excitation_name
-from exo_env.observations import PREVIEW, Observer, patient_channels, truth_of
+from exo_env.human import MUSCLES
+from exo_env.observations import PREVIEW, TRUTH_SIZE, Observer
+from exo_env.patient import PATIENT
 from exo_env.rewards import TERMS, Weights
 
 SENSORS = (
@@ -22,45 +24,50 @@ SENSORS = (
 
 
 def plant_of(
-    episode: Episode, observer: Observer, weights: Weights, limits: Limits, generator: np.random.Generator
+    world: World,
+    names: dict[str, int],
+    inputs: np.ndarray,
+    *,
+    period: float,
+    times: np.ndarray,
+    drive: np.ndarray,
+    axes: np.ndarray,
+    observer: Observer,
+    weights: Weights,
+    limits: Limits,
 ) -> Packed:
-    """A packed Plant at the start of an episode; the noise of the whole episode is drawn here.
+    """A packed Plant without a patient.
 
     Args:
-        episode: whose world, patient and repetition it holds.
+        world: the DAE.
+        names: place of each sensor's component in a reading.
+        inputs: rows of commands and excitations in the signals of the world, shape (8,).
+        period: control period [s].
+        times: control times [s], shape (k,).
+        drive: table of the drive, shape (2, 3).
+        axes: of the worn device, shape (3, 3).
         observer: what is observed, and how well.
         weights: of the reward.
         limits: that end an episode.
-        generator: of the environment.
     """
-    times, world, zeros = episode.times, episode.world, np.zeros
-    course, last, n = episode.course, episode.times[-1], observer.size
-    ahead = [episode.repetition.course(np.minimum(times + t, last))[:, 0] for t in PREVIEW]
-    rows = [world.state.signals.ptr[world.model.input_index(name)] for name in _inputs(episode)]
+    k, n, zeros = len(times), observer.size, np.zeros
     status = zeros(len(STATUS), np.int64)
-    status[STATUS.steps] = len(times) - 1
+    status[STATUS.steps] = k - 1
     return Packed(Plant(
         model=world.tables, world=world.packed, sensing=world.model.sensing,
-        options=np.array(world.options.numbers(), float), patient=episode.effort.numbers, effort=episode.effort.state,
-        period=np.array([episode.period]), wanted=episode.wanted, course=course,
-        preview=np.ascontiguousarray(np.stack(ahead, axis=1)), lacking=episode.need.lacking,
-        scale=np.array([episode.need.scale]), noise=generator.standard_normal((len(times), 1 + n)),
-        drive=episode.drive.table(episode.period), commands=episode.held.copy(), excitations=zeros(len(MUSCLES)),
-        stretch=zeros(len(MUSCLES)), inputs=np.array(rows, np.int64),
-        axes=np.ascontiguousarray(episode.worn.axes),
-        places=np.array([episode.names[name] for name in SENSORS], np.int64), y=zeros(len(episode.names)),
-        reading=zeros(len(READING)), truth=_constants(episode), columns=observer.columns, sensors=observer.sensors,
-        memory=observer.memory(), observation=zeros(n), action=zeros(2), before=zeros(2), weights=weights.numbers(),
-        limits=limits.numbers(), terms=zeros(len(TERMS)), reward=zeros(1), status=status,
+        options=np.array(world.options.numbers(), float), patient=zeros(len(PATIENT)), effort=zeros(state_size(period)),
+        period=np.array([period]), wanted=zeros((k, len(MUSCLES))), course=zeros((k, 3)),
+        preview=zeros((k, len(PREVIEW))), lacking=zeros(k), scale=zeros(1), noise=zeros((k, 1 + n)), drive=drive,
+        commands=zeros(2), excitations=zeros(len(MUSCLES)), stretch=zeros(len(MUSCLES)), inputs=inputs, axes=axes,
+        places=np.array([names[name] for name in SENSORS], np.int64), y=zeros(len(names)), reading=zeros(len(READING)),
+        truth=zeros(TRUTH_SIZE), columns=observer.columns, sensors=observer.sensors, memory=observer.memory(),
+        observation=zeros(n), action=zeros(2), before=zeros(2), weights=weights.numbers(), limits=limits.numbers(),
+        terms=zeros(len(TERMS)), reward=zeros(1), status=status,
     ))  # fmt: skip
 
 
-def _inputs(episode: Episode) -> list[str]:
-    """Names of the inputs that a control period sets."""
-    return [*episode.drive.inputs, *(excitation_name(m) for m in MUSCLES)]
-
-
-def _constants(episode: Episode) -> np.ndarray:
-    """Channels that do not change in an episode; the rest is 0."""
-    patient = {c.name: getattr(episode.patient, c.name) for c in patient_channels()}
-    return truth_of({**patient, "load": episode.ecosystem.weight})
+def clear(plant: Plant) -> None:
+    """Forget the last episode: nothing done, nothing read."""
+    for x in (plant.excitations, plant.stretch, plant.y, plant.reading, plant.memory, plant.action, plant.before,
+              plant.terms, plant.reward, plant.status[: STATUS.steps]):  # fmt: skip
+        x[...] = 0

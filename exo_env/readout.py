@@ -56,7 +56,7 @@ class Readout:
         found = {name: float(self.plant.y[k]) for name, k in e.names.items()}
         found |= {
             "time": e.world.time, "reference": self.reference, "tracking_error": self.error,
-            "elbow_reaction": self[READING.reaction], "device_share": self[READING.share], "effort": e.effort.effort,
+            "elbow_reaction": self[READING.reaction], "device_share": self[READING.share], "effort": e.effort,
         }  # fmt: skip
         found |= {name: float(x) for name, x in zip(e.drive.inputs, self.plant.commands, strict=True)}
         return found | {f"solver.{name}": float(x) for name, x in e.world.stats().as_dict().items()}

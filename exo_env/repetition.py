@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 from dms_core.errors import InputError
 from dms_core.model import MinimumJerk
 from exo_env.distributions import distribution
+from exo_env.jit import compiled
 from exo_env.settings import Settings
 
 LOWEST, HIGHEST = 20.0, 100.0
@@ -63,16 +64,33 @@ class Repetition(Settings):
 
     def course(self, times: np.ndarray) -> np.ndarray:
         """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at times [s] in rising order, shape (n, 3)."""
-        pieces = self.signal.pieces()
-        k = np.maximum(np.searchsorted(pieces.t, times, side="right") - 1, 0)
-        x, c = times - pieces.t[k], pieces.c[k]
-        powers = np.arange(c.shape[1])
-        found = np.empty((len(times), 3))
-        for order in range(3):
-            found[:, order] = np.sum(c * x[:, None] ** powers, axis=1)
-            c = c[:, 1:] * powers[1:]
-            powers = powers[:-1]
+        pieces, found = self.signal.pieces(), np.empty((len(times), 3))
+        course_of(pieces.t, pieces.c, np.asarray(times, float), found)
         return found
+
+
+@compiled
+def course_of(starts, c, times, out):
+    """Value, rate and acceleration of a signal's pieces, which go on behind the last and before the first.
+
+    Args:
+        starts: of the pieces [s], shape (n,).
+        c: their coefficients, shape (n, 6).
+        times: in rising order [s], shape (k,).
+        out: shape (k, 3).
+    """
+    i = 0
+    for k in range(times.shape[0]):
+        while i + 1 < starts.shape[0] and starts[i + 1] <= times[k]:
+            i += 1
+        x = times[k] - starts[i]
+        out[k, 0] = out[k, 1] = out[k, 2] = 0.0
+        for j in range(c.shape[1] - 1, -1, -1):
+            # Horner's scheme of a polynomial, its rate and half its acceleration.
+            out[k, 2] = out[k, 2] * x + out[k, 1]
+            out[k, 1] = out[k, 1] * x + out[k, 0]
+            out[k, 0] = out[k, 0] * x + c[i, j]
+        out[k, 2] *= 2.0
 
 
 class Repetitions(Settings):

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from dms_core.errors import InputError, choices
 from exo_env.batch import NUMBERS, Batch
 from exo_env.control_period import STATUS
+from exo_env.episode import Episode
 from exo_env.events import NOTHING, SOLVER
 from exo_env.lift_env import ElbowLiftEnv
 from exo_env.rewards import TERMS
@@ -60,6 +61,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         self.action_space = batch_space(one.action_space, self.num_envs)
         self._batch = Batch(self.num_envs, one.observer.size, threads)
         self._over = np.ones(self.num_envs, bool)
+        self._episodes: list[Episode | None] = [None] * self.num_envs
         self._started = False
 
     @property
@@ -114,7 +116,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         """A new episode in world i; gives its info."""
         _, info = self.envs[i].reset(seed=seed, options=options)
         self._batch.put(i, self.envs[i].packed)
-        self._over[i] = False
+        self._episodes[i], self._over[i] = self.envs[i].episode, False
         return info
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -131,7 +133,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         if not self._started or (self.autoreset_mode == AutoresetMode.DISABLED and self._over.any()):
             raise gymnasium.error.ResetNeeded("An episode is over, or none has begun; call reset() first.")
         for i, env in enumerate(self.envs):
-            if env.packed is not self._batch.worlds[i]:
+            if env.episode is not self._episodes[i]:
                 raise gymnasium.error.ResetNeeded(f"World {i} was reset by itself; call reset() of the batch.")
         running = ~self._over
         which = np.flatnonzero(running)

@@ -191,6 +191,17 @@ class Model:
         return new_state(self._tables.values, self.new_work(), signals, self.start.q, self.start.v)
 
     @property
+    def numbers(self) -> tuple[np.ndarray, ...]:
+        """Numbers of dynamics, constraints and sensors, scales of q and v, inverse of the welds.
+
+        Those of a model of the same structure may be written into them in place; `start` and declarations stay what
+        they were.
+        """
+        calls = (self._dynamics.values, self._constraints.values, self._sensors.values)
+        tables = self._tables.values
+        return (*(c.par for c in calls), tables.scale_q, tables.scale_v, self.welds.inverse)
+
+    @property
     def tables(self) -> Packed:
         """Constant tables (a packed Tables) for the compiled solver."""
         return self._tables

@@ -34,6 +34,7 @@ from dms_core.simulation.state import (
     Options,
     State,
     T,
+    put_start,
     with_tables,
 )
 
@@ -150,6 +151,11 @@ class World:
         self.state.signals.c[row, 0] = value
         self.state.counts[RESTART] = 1
         return True
+
+    def begin(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Back to t = 0 at another consistent start, shape (n_q,) each; inputs stay as they are."""
+        put_start(self.state, q, v)
+        self.result = Result.SUCCESS
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.

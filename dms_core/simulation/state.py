@@ -118,15 +118,27 @@ def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
 def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.ndarray) -> Packed:
     """A world at its start: q and v of shape (n_q,)."""
     n, m = len(tables.second), len(w.lam)
-    zeros = np.zeros
-    w.q[:n], w.v[:n] = q, v
-    counts = zeros(11, np.int64)
-    counts[RESTART] = counts[STALE] = 1
-    return Packed(State(
-        w, signals, zeros(9), counts, np.array([0.0, 0.0, 0.0, np.inf, 0.0]),
-        q.copy(), v.copy(), v.copy(), zeros(n), zeros(m), zeros(m), q.copy(), v.copy(), zeros(m),
-        *(zeros(n) for _ in range(6)), **_linear_arrays(tables),
-    ))  # fmt: skip
+    histories = ("q", "v", "qd", "vd", "q_before", "v_before", "cq", "cv", "q_guess", "v_guess", "wq", "wv")
+    state = State(
+        w=w, signals=signals, clock=np.zeros(9), counts=np.zeros(11, np.int64), largest=np.zeros(5),
+        **{name: np.zeros(n) for name in histories}, **{name: np.zeros(m) for name in ("lam", "mu", "lam_before")},
+        **_linear_arrays(tables),
+    )  # fmt: skip
+    put_start(state, q, v)
+    return Packed(state)
+
+
+def put_start(state: State, q: np.ndarray, v: np.ndarray) -> None:
+    """Back to t = 0, at q and v of shape (n_q,), as if nothing had been computed; inputs stay."""
+    n, w = len(q), state.w
+    for x in (state.clock, state.counts, state.largest, state.vd, state.lam, state.mu, state.lam_before, w.lam, w.mu):
+        x[:] = 0
+    state.counts[RESTART] = state.counts[STALE] = 1
+    state.largest[H_LEAST] = np.inf
+    for x in (state.q, state.q_before, w.q[:n]):
+        x[:] = q
+    for x in (state.v, state.qd, state.v_before, w.v[:n]):
+        x[:] = v
 
 
 def with_tables(tables: Tables, state: State) -> Packed:

@@ -132,7 +132,7 @@ def test_a_world_fits_into_256_kib():
             elif isinstance(value, np.ndarray):
                 yield value
 
-    one, other = ({id(a): a.nbytes for a in arrays([env._packed.values])} for env in batch.envs)
+    one, other = ({id(a): a.nbytes for a in arrays([env.packed.values])} for env in batch.envs)
     own = sum(size for key, size in one.items() if key not in other)
     assert own < 256 * 1024, own
 

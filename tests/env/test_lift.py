@@ -10,7 +10,7 @@ from dms_core.simulation.state import Options
 from exo_env.actions import RopeTension
 from exo_env.control_period import device_share
 from exo_env.lift_env import ElbowLiftEnv
-from exo_env.observations import Observer, imperfect, truth_of
+from exo_env.observations import TRUTH, TRUTH_SIZE, Observer, imperfect
 from exo_env.repetition import Repetition
 from exo_env.rewards import TERMS, Weights, term_values
 from exo_env.soak import soak
@@ -165,11 +165,13 @@ def test_noise_delay_and_quantisation():
                "reference_rate": 0.0, "preview": [0.0] * 3, "last_action": [0.0, 0.0]}  # fmt: skip
     spec = {"angle": {"delay": 0.03}, "rate": {"quantum": 0.25}, "guide_force": {"deviation": 2.0}}
     observer, generator = Observer(["device"], spec, 0.02), np.random.default_rng(0)
-    memory, out = observer.memory(), np.zeros(observer.size)
+    memory, out, truth = observer.memory(), np.zeros(observer.size), np.zeros(TRUTH_SIZE)
 
     def observed(changed, first=False):
         noise = generator.standard_normal(observer.size)
-        imperfect(truth_of(reading | changed), observer.columns, observer.sensors, memory, noise, first, out)
+        for name, values in (reading | changed).items():
+            truth[getattr(TRUTH, name) :][: np.size(values)] = values
+        imperfect(truth, observer.columns, observer.sensors, memory, noise, first, out)
         return out.copy()
 
     observed({}, first=True)
@@ -250,7 +252,8 @@ def test_limits_end_an_episode(limits, word):
     assert terminated and word in info["event"]
 
 
-def test_a_failed_solver_ends_the_episode_with_its_sentence(env):
+def test_a_failed_solver_ends_the_episode_with_its_sentence():
+    env = ElbowLiftEnv(patient={}, load=1.0)
     env.reset(seed=0)
     before, *_ = env.step(HOLD)
     env._plant.options[Options._fields.index("max_steps")] = 1
