@@ -58,11 +58,11 @@ def event_code(limits, angle, agonist, antagonist, reaction):
     return NOTHING if reaction <= limits[3] else REACTION
 
 
-def event(code: int, limits: Limits, angle: float, tension: float, reaction: float) -> str | None:
-    """The sentence on an event of `event_code`, None for NOTHING.
+def event(code: int, limits: Limits, angle: float, tension: float, reaction: float) -> str:
+    """The sentence on a limit that was passed.
 
     Args:
-        code: of the event.
+        code: ANGLE, TENSION or REACTION.
         limits: of this environment.
         angle: of the elbow [rad].
         tension: largest of both ropes [N].
@@ -73,6 +73,4 @@ def event(code: int, limits: Limits, angle: float, tension: float, reaction: flo
         return f"The elbow is at {math.degrees(angle):.1f} deg, outside {low:g} to {high:g} deg."
     if code == TENSION:
         return f"A rope pulls with {tension:.0f} N; {limits.tension:g} N is the limit."
-    if code == REACTION:
-        return f"The elbow's reaction force is {reaction:.0f} N; {limits.reaction:g} N is the limit."
-    return None
+    return f"The elbow's reaction force is {reaction:.0f} N; {limits.reaction:g} N is the limit."

@@ -136,7 +136,7 @@ class Fitting:
     def __init__(self, ecosystem: Ecosystem, mode: str, drive: Drive) -> None:
         self.ecosystem, self.mode, self.drive = ecosystem, mode, drive
         self._coefficients: dict[str, np.ndarray] = {}
-        self._shapes: list[tuple[int, ...]] = []
+        self._parts: list[tuple[int, int, tuple[int, ...]]] = []
 
     def numbers(self, patient: Patient, weight: float) -> Numbers:
         """Of a patient who lifts a weight [kg]."""
@@ -144,11 +144,7 @@ class Fitting:
         if sex not in self._coefficients:
             self._coefficients[sex] = self._found(sex)
         x = self._coefficients[sex] @ monomials(patient.person, weight, patient.time_constants(Arm()))
-        parts, first = [], 0
-        for shape in self._shapes:
-            size = int(np.prod(shape))
-            parts.append(x[first : first + size].reshape(shape))
-            first += size
+        parts = [x[first:end].reshape(shape) for first, end, shape in self._parts]
         count = len(parts) - len(Numbers._fields) + 1
         return Numbers(tuple(parts[:count]), *parts[count:])
 
@@ -165,7 +161,8 @@ class Fitting:
             system = declared(joined, self.drive, TEMPLATE_ANGLE, self.drive.start(0.0), times=times)
             given = numbers_of(Model(system, like=template(self.mode)), Arm(person))
             parts = [*given.model, *given[1:]]
-            self._shapes = [x.shape for x in parts]
+            ends = np.cumsum([x.size for x in parts]).tolist()
+            self._parts = [(end - x.size, end, x.shape) for end, x in zip(ends, parts, strict=True)]
             rows.append(monomials(person, weight, times))
             found.append(np.concatenate([x.ravel() for x in parts]))
         C = np.linalg.solve(np.array(rows), np.array(found)).T

@@ -317,6 +317,8 @@ class ElbowLiftEnv(gymnasium.Env):
     def happened(self) -> str | None:
         """The sentence on what ended the episode, or None."""
         code, r = self._plant.status[STATUS.event], self._readout
+        if code == NOTHING:
+            return None
         if code == SOLVER:
             return f"{self.episode.world.result.value} Stopped at t = {self.episode.world.time:.6g} s."
         return event(int(code), self.limits, r.angle, float(max(r.tensions)), r[READING.reaction])

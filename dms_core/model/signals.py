@@ -126,12 +126,13 @@ class MinimumJerk(_Table):
 
     def pieces(self) -> Pieces:
         """Quintic pieces x0 + d (10 s^3 - 15 s^4 + 6 s^5), s = (t - t0) / T."""
-        t, x = np.asarray(self.times), np.asarray(self.values)
-        T, d = np.append(np.diff(t), 1.0), np.append(np.diff(x), 0.0)
-        zero = np.zeros(len(t))
-        columns = [x, zero, zero, 10 * d / T**3, -15 * d / T**4, 6 * d / T**5]
-        columns = [np.append(c[:1] if k == 0 else [0.0], c) for k, c in enumerate(columns)]
-        return _pieces(np.append(t[0] - 1.0, t), columns)
+        t, x = np.array(self.times), np.array(self.values)
+        T, d = t[1:] - t[:-1], x[1:] - x[:-1]
+        # A piece of rest before the first point and one behind the last.
+        c = np.zeros((len(t) + 1, DEGREE + 1))
+        c[0, 0], c[1:, 0] = x[0], x
+        c[1:-1, 3], c[1:-1, 4], c[1:-1, 5] = 10 * d / T**3, -15 * d / T**4, 6 * d / T**5
+        return Pieces(np.concatenate([[t[0] - 1.0], t]), c, np.zeros(0))
 
 
 class Harmonic(Signal):
