@@ -22,6 +22,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from agents.config import Config
+from agents.critic import TwoViewPolicy, seen_places
 from dms_core.errors import InputError, choices
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "tqc": TQC, "recurrent_ppo": RecurrentPPO}
@@ -99,10 +100,16 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
     Raises:
         InputError: the algorithm refuses its arguments.
     """
-    given = arguments(config)
+    given, critic = arguments(config), config.training.critic
+    policy: Any = config.policy
+    if critic:
+        if (config.training.algorithm, policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
+            raise InputError("training.critic is for PPO's MlpPolicy without frame_stack.")
+        seen = seen_places(worlds, critic, len(config.training.traces))
+        policy, given["policy_kwargs"] = TwoViewPolicy, given.get("policy_kwargs", {}) | {"seen": seen}
     try:
         return find(config.training.algorithm)(
-            policy=config.policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
+            policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
         )
     except (AssertionError, ValueError, TypeError, RuntimeError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
