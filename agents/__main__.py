@@ -45,6 +45,7 @@ def evaluate(
     patients: int = 20,
     seed: int = 0,
     loads: tuple[float, ...] = (),
+    repetitions: int = 1,
     workers: Literal["here", "ray"] = "here",
     address: str | None = None,
 ) -> int:
@@ -57,6 +58,7 @@ def evaluate(
         patients: how many; one episode each, or one a load.
         seed: of the patients and of the bootstrap.
         loads: that each patient lifts [kg]; one drawn for each patient where none is given.
+        repetitions: of the movement in an episode.
         workers: 'ray' shares the episodes out, with the same results to the last bit.
         address: of a Ray cluster; a local one is started where it is not given.
     """
@@ -77,9 +79,12 @@ def evaluate(
         if workers == "ray":
             from agents.shared_evaluation import evaluate_by_ray
 
-            results = evaluate_by_ray(used, population, patients, seed, loads=loads, address=address, progress=progress)
+            results = evaluate_by_ray(
+                used, population, patients, seed, loads=loads, address=address, progress=progress,
+                repetitions=repetitions,
+            )  # fmt: skip
         else:
-            results = run_all(used, population, patients, seed, loads=loads, progress=progress)
+            results = run_all(used, population, patients, seed, loads=loads, progress=progress, repetitions=repetitions)
     write_json(out / "evaluation.json", _json(results))
     draw(out / "evaluation.png", results)
     print(f"{patients} patients of '{population}', seed {seed}: interquartile mean [95 % bootstrap interval]")

@@ -14,6 +14,7 @@ import types
 from collections.abc import Callable, Mapping
 from typing import Any, Union, get_args, get_origin
 
+import torch
 from sb3_contrib import TQC, RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -22,6 +23,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from agents.config import Config
+from agents.critic import TwoViewPolicy, seen_places
 from dms_core.errors import InputError, choices
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "tqc": TQC, "recurrent_ppo": RecurrentPPO}
@@ -60,6 +62,10 @@ def arguments(config: Config) -> dict[str, Any]:
     name, algorithm = config.training.algorithm, find(config.training.algorithm)
     if config.policy not in policies(name):
         raise InputError(f"policy = '{config.policy}'; {name} takes {choices(policies(name))}.")
+    if config.training.start is not None and name not in ("ppo", "recurrent_ppo"):
+        raise InputError(f"training.start is for ppo and recurrent_ppo, not for {name}.")
+    if config.training.critic and (name, config.policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
+        raise InputError("training.critic is for the MlpPolicy of ppo, without frame_stack.")
     _check(name, config.arguments, allowed(algorithm))
     given = config.arguments.get("policy_kwargs", {})
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
@@ -99,14 +105,23 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
     Raises:
         InputError: the algorithm refuses its arguments.
     """
-    given = arguments(config)
+    given, critic = arguments(config), config.training.critic
+    policy: Any = config.policy
+    if critic:
+        seen = seen_places(worlds, critic, len(config.training.traces))
+        policy, given["policy_kwargs"] = TwoViewPolicy, given.get("policy_kwargs", {}) | {"seen": seen}
     try:
-        return find(config.training.algorithm)(
-            policy=config.policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
+        found = find(config.training.algorithm)(
+            policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
         )
     except (AssertionError, ValueError, TypeError, RuntimeError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
+    if config.training.start is not None:
+        last: Any = found.policy
+        with torch.no_grad():
+            last.action_net.bias[:] = torch.tensor(config.training.start)
+    return found
 
 
 def _check(who: str, given: Any, known: Mapping[str, Any]) -> None:

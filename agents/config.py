@@ -38,6 +38,16 @@ class Training(Settings):
     eval_seed: int = Field(default=20_251_013, ge=0, description="of its patients, the same ones every time")
     save_every: int = Field(default=50_000, ge=1, description="steps between two checkpoints")
     threads: int = Field(default=1, ge=1, le=256, description="of PyTorch; small networks gain nothing from more")
+    traces: tuple[float, ...] = Field(
+        default=(), max_length=8, description="time constants of filtered observations beside each one [s], traces.py"
+    )
+    hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held, see hold.py")
+    start: tuple[float, float] | None = Field(
+        default=None, description="action of PPO's untrained policy, from which it learns to differ; None: 0 and 0"
+    )
+    critic: tuple[str, ...] = Field(
+        default=(), description="groups of the observation that only PPO's critic sees, see critic.py"
+    )
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?|mps|auto)$", description="of PyTorch")
 
 

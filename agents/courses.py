@@ -39,7 +39,9 @@ class Course:
         return f"commands {flexors:.0%} of the flexors, {extensors:.0%} of the extensors; {self.load:.1f} kg"
 
 
-def course(policy: Policy, patient: Source, seed: int, options: dict[str, Any] | None = None) -> Course:
+def course(
+    policy: Policy, patient: Source, seed: int, options: dict[str, Any] | None = None, **settings: Any
+) -> Course:
     """Run an episode.
 
     Args:
@@ -47,8 +49,9 @@ def course(policy: Policy, patient: Source, seed: int, options: dict[str, Any] |
         patient: population to draw from.
         seed: of the episode.
         options: of the environment's reset.
+        settings: further ones of the environment.
     """
-    env = world_of(policy, population(patient).model_dump())
+    env = world_of(policy, population(patient).model_dump(), **settings)
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=options)
     policy.reset(env)

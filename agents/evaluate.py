@@ -7,7 +7,7 @@ the difference is known better than either (`differences`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -71,7 +71,7 @@ def evaluate(
     check_numbers(patients, seed)
     source, cases = population(patients_of), cases_of(seed, patients, loads)
     episodes = [episodes_of(one, source.model_dump(), cases, settings, progress) for one in policies]
-    return results_of(policies, episodes, source.title, patients, seed, loads)
+    return results_of(policies, episodes, source.title, patients, seed, loads, settings)
 
 
 def world_of(policy: Policy, patient: Source, **settings: Any) -> gymnasium.Env:
@@ -112,7 +112,7 @@ def episodes_of(
 
 def results_of(
     policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], title: str, patients: int, seed: int,
-    loads: Sequence[float] = (),
+    loads: Sequence[float] = (), settings: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """What `evaluate` returns, from the episodes of each policy."""
     found = {}
@@ -123,7 +123,7 @@ def results_of(
             "difference": differences(those, episodes[0], seed), "episodes": those,
         }  # fmt: skip
     return {
-        "population": title, "patients": patients, "loads": list(loads), "seed": seed,
+        "population": title, "patients": patients, "loads": list(loads), "seed": seed, "settings": dict(settings or {}),
         "statistic": "interquartile mean", "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE,
         "policies": found,
     }  # fmt: skip

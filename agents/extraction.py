@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -15,12 +16,13 @@ from agents.config import ENVIRONMENT_ID
 from agents.learned import Description, LearnedPolicy, world_facts
 from agents.network import Architecture
 from agents.provenance import package_version
+from agents.traces import kept_shares
 from dms_core.errors import InputError
 
 
 def extract(
     model: BaseAlgorithm, env: gymnasium.Env, *, algorithm: str, env_kwargs: dict[str, Any], seed: int | None,
-    normalisation: VecNormalize | None = None,
+    normalisation: VecNormalize | None = None, traces: Sequence[float] = (), hold: int = 1,
 ) -> LearnedPolicy:  # fmt: skip
     """The policy of a model.
 
@@ -31,6 +33,8 @@ def extract(
         env_kwargs: of its training environment.
         seed: of its training.
         normalisation: of its observations; of the model's own worlds where it is not given.
+        traces: time constants of filtered observations [s].
+        hold: control periods that an action is held.
 
     Raises:
         InputError: the model's policy has parts that cannot be written down.
@@ -40,8 +44,10 @@ def extract(
     statistics: Any = normalisation or (model.get_vec_normalize_env() if model.get_env() is not None else None)
     arrays = layers | cells
     if statistics is not None and statistics.norm_obs:
-        arrays |= {"mean": np.array(statistics.obs_rms.mean), "variance": np.array(statistics.obs_rms.var)}
-    shape = _architecture(model, arrays, output, env, statistics)
+        seen = getattr(model.policy, "seen", slice(None))
+        arrays |= {"mean": statistics.obs_rms.mean[seen].copy(), "variance": statistics.obs_rms.var[seen].copy()}
+    world: Any = env.unwrapped
+    shape = _architecture(model, arrays, output, env, statistics, kept_shares(traces, hold * world.period), hold)
     description = Description(
         title=f"{algorithm.upper().replace('_', ' ')}" + ("" if seed is None else f", seed {seed}"),
         algorithm=algorithm, environment=ENVIRONMENT_ID, exo_env=package_version(), env_kwargs=env_kwargs,
@@ -51,18 +57,21 @@ def extract(
 
 
 def _architecture(
-    model: BaseAlgorithm, arrays: dict[str, np.ndarray], output: str, env: gymnasium.Env, statistics: Any
-) -> Architecture:
+    model: BaseAlgorithm, arrays: dict[str, np.ndarray], output: str, env: gymnasium.Env, statistics: Any,
+    kept: tuple[float, ...], hold: int,
+) -> Architecture:  # fmt: skip
     """Shape of the network."""
     spaces: Any = (model.observation_space, env.observation_space)
     inputs, single = (space.shape[0] for space in spaces)
+    inputs = len(getattr(model.policy, "seen", range(inputs)))
+    single *= 1 + len(kept)
     if inputs % single:
         raise InputError(f"the model sees {inputs} numbers; the environment shows {single}.")
     biases = [arrays[f"layer.{k}.bias"].size for k in range(sum(name.endswith(".bias") for name in arrays))]
     cells = sum(name.endswith(".state") for name in arrays)
     normalised = "mean" in arrays
     return Architecture(
-        inputs=inputs, n_stack=inputs // single, hidden=tuple(biases[:-1]), outputs=biases[-1],
+        inputs=inputs, n_stack=inputs // single, traces=kept, hold=hold, hidden=tuple(biases[:-1]), outputs=biases[-1],
         activation=_activation(model), lstm_layers=cells,
         lstm_width=arrays["lstm.0.state"].shape[1] if cells else 0, output="tanh" if output == "tanh" else "clip",
         normalised=normalised,

@@ -29,6 +29,10 @@ class Architecture(Settings):
 
     inputs: int = Field(ge=1, description="components of what it sees, stacked observations included")
     n_stack: int = Field(default=1, ge=1, description="observations that it sees at once, the newest last")
+    hold: int = Field(default=1, ge=1, description="control periods of an action; what comes between is not looked at")
+    traces: tuple[float, ...] = Field(
+        default=(), description="shares that low-pass filters of what it sees keep from action to action, a filter each"
+    )
     hidden: tuple[int, ...] = Field(description="widths of the layers before the output")
     outputs: int = Field(default=2, ge=1)
     activation: str = Field(description="between the layers")
@@ -84,15 +88,24 @@ class Network:
     def reset(self) -> None:
         """Forget what was seen."""
         s = self.shape
-        self._seen = np.zeros(s.inputs, dtype=np.float32)
+        self._seen = np.zeros(s.inputs // (1 + len(s.traces)), dtype=np.float32)
+        self._memory: np.ndarray | None = None
+        self._action, self._left = np.zeros(s.outputs), 0
         self._hidden = np.zeros((s.lstm_layers, s.lstm_width))
         self._cell = np.zeros((s.lstm_layers, s.lstm_width))
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """The action that the policy holds best, shape (outputs,), after one more observation."""
+        if self._left == 0:
+            self._action, self._left = self._decided(observation), self.shape.hold
+        self._left -= 1
+        return self._action.copy()
+
+    def _decided(self, observation: np.ndarray) -> np.ndarray:
+        """A new action."""
         s, size = self.shape, observation.size
         self._seen = np.concatenate([self._seen[size:], observation.astype(np.float32)])
-        x = self.normalise(self._seen)
+        x = self.normalise(self._remembered())
         for k in range(s.lstm_layers):
             x = self._lstm(k, x)
         last = len(s.hidden)
@@ -100,6 +113,15 @@ class Network:
             x = self._arrays[f"layer.{k}.weight"] @ x + self._arrays[f"layer.{k}.bias"]
             x = self._activation(x) if k < last else x
         return np.tanh(x) if s.output == "tanh" else np.clip(x, -1.0, 1.0)
+
+    def _remembered(self) -> np.ndarray:
+        """What is seen, followed by what the filters make of it."""
+        if not self.shape.traces:
+            return self._seen
+        if self._memory is None:
+            self._memory = np.tile(self._seen, (len(self.shape.traces), 1)).astype(float)
+        self._memory += (1.0 - np.array(self.shape.traces)[:, None]) * (self._seen - self._memory)
+        return np.concatenate([self._seen, self._memory.ravel()], dtype=np.float32)
 
     def normalise(self, seen: np.ndarray) -> np.ndarray:
         """What the first layer gets."""

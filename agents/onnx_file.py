@@ -1,8 +1,8 @@
 """A policy as ONNX (https://onnx.ai), normalisation and squashing included, for runtimes outside Python.
 
-Inputs are `observation`, shape (1, inputs), stacked ones included, and for LSTM cells `hidden` and `cell`, shape
-(layers, width), zeros at the start of an episode; outputs are `action` and the new `hidden` and `cell`. Numbers are
-double precision inside, as in network.py.
+Inputs are `observation`, shape (1, inputs), stacked and filtered ones (traces.py) included, and for LSTM cells `hidden`
+and `cell`, shape (layers, width), zeros at the start of an episode; outputs are `action` and the new `hidden` and
+`cell`. An action is for `hold` control periods (policy.json). Numbers are double precision inside, as in network.py.
 """
 
 from __future__ import annotations

@@ -54,7 +54,8 @@ def report(
         lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
     shown = _shown(policy_names, evaluations, trainings)
     if shown:
-        lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed)
+        settings = evaluations[0].get("settings", {}) if evaluations else {}
+        lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed, settings)
     if shown and evaluations:
         lines += _worst(out, shown, evaluations[0])
     with whole_file(out / "report.md") as file:
@@ -80,7 +81,8 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
             found = _json(path if path.is_file() else path / EVALUATION)
             if not isinstance(found, dict) or not {"population", "patients", "seed", "policies"} <= found.keys():
                 raise InputError(f"'{path}' is not an evaluation.")
-            key = (*(found[k] for k in ("population", "patients", "seed")), *found.get("loads", ()))
+            settings = json.dumps(found.get("settings", {}), sort_keys=True)
+            key = (*(found[k] for k in ("population", "patients", "seed")), settings, *found.get("loads", ()))
             known = evaluations.setdefault(key, {**found, "policies": {}})
             known["policies"] |= found["policies"]
             first = next(iter(known["policies"].values()))["episodes"]
@@ -173,9 +175,11 @@ def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], training
     return shown[:2]
 
 
-def _patients(out: Path, shown: Sequence[Policy], whom: Mapping[str, str], seed: int) -> list[str]:
+def _patients(
+    out: Path, shown: Sequence[Policy], whom: Mapping[str, str], seed: int, settings: Mapping[str, Any]
+) -> list[str]:
     """Figure of patients over time."""
-    columns = {title: [course(p, source, seed) for p in shown] for title, source in whom.items()}
+    columns = {title: [course(p, source, seed, **settings) for p in shown] for title, source in whom.items()}
     report_figures.courses(out / "patients.png", columns)
     return ["## Patients over time", "", "![Two patients under two policies](patients.png)", ""]
 
@@ -196,7 +200,9 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
 
 def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -> Course:
     """An episode of an evaluation once more: to the last bit where its population is a shipped one."""
+    settings = results.get("settings", {})
     for name in shipped_populations():
         if population(name).title == results["population"]:
-            return course(policy, name, one["seed"], {"load": one["load"]} if results.get("loads") else None)
-    return course(policy, one["patient"], one["seed"], {k: one[k] for k in ("load", "reference")})
+            load = {"load": one["load"]} if results.get("loads") else None
+            return course(policy, name, one["seed"], load, **settings)
+    return course(policy, one["patient"], one["seed"], {k: one[k] for k in ("load", "reference")}, **settings)

@@ -40,4 +40,4 @@ def evaluate_by_ray(
     found = share_out(episodes_of, shares, address=address, cpus=cpus, done=done)
     n = len(parts)
     joined = [[e for part in found[k * n : (k + 1) * n] for e in part] for k in range(len(policies))]
-    return results_of(policies, joined, source.title, patients, seed, loads)
+    return results_of(policies, joined, source.title, patients, seed, loads, settings)

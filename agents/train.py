@@ -18,11 +18,14 @@ from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecNormalize
 
 from agents.algorithms import arguments, build
 from agents.config import Config
+from agents.critic import actor_size
 from agents.evaluate import ENVIRONMENT, episode, patient_seeds
 from agents.extraction import extract
+from agents.hold import Held
 from agents.learned import LearnedPolicy
 from agents.model_state import load_state, save_model, save_state
 from agents.run_folder import EVALUATIONS, RunFolder
+from agents.traces import Traces, kept_shares
 from agents.worlds import training_worlds
 from dms_core.errors import DmsError, InputError
 from dms_core.output_file import write_json
@@ -139,7 +142,7 @@ class TrainingRun:
         """The policy of now."""
         return extract(
             self.model, self.env, algorithm=self.config.training.algorithm, env_kwargs=self.config.env_kwargs,
-            seed=self.seed,
+            seed=self.seed, traces=self.config.training.traces, hold=self.config.training.hold,
         )  # fmt: skip
 
     def _write_best(self, part: Path, policy: LearnedPolicy, record: dict[str, Any]) -> None:
@@ -206,9 +209,16 @@ def wrapped(config: Config, seed: int) -> VecEnv:
     rl_zoo3 normalises first; then algorithms with a replay buffer could not have both.
     """
     arguments(config)
-    worlds = training_worlds(config.env_kwargs, config.n_envs, seed)
+    own, more = list(config.env_kwargs.get("observation", ("device",))), config.training.critic
+    worlds = training_worlds(config.env_kwargs | {"observation": [*own, *more]}, config.n_envs, seed)
+    period = config.training.hold * worlds.get_attr("period", 0)[0]
+    if config.training.hold > 1:
+        worlds = Held(worlds, config.training.hold)
     if config.frame_stack > 1:
         worlds = VecFrameStack(worlds, config.frame_stack)
+    if config.training.traces:
+        kept = kept_shares(config.training.traces, period)
+        worlds = Traces(worlds, kept, config.frame_stack * actor_size(worlds, more))
     return worlds if config.normalize is None else VecNormalize(worlds, **config.normalize)
 
 

@@ -18,7 +18,7 @@ TRIES = "baselines_tries.csv"
 
 
 def tune_baselines(
-    tries: int = 48, patients: int = 30, seed: int = 0, workers: int = 1, out: Path | None = None
+    tries: int = 48, patients: int = 30, seed: int = 0, repetitions: int = 1, workers: int = 1, out: Path | None = None
 ) -> int:
     """Search the baselines' numbers for the best mean return on the training population.
 
@@ -26,12 +26,14 @@ def tune_baselines(
         tries: of each policy, half of them spread over its ranges and half around the best.
         patients: episodes of each try.
         seed: of the patients and of the search.
+        repetitions: of the movement in an episode.
         workers: processes.
         out: folder of baselines.yml, which the policies read, and of the table of tries; default: where they read it.
     """
     folder = (configs() / FILE).parent if out is None else out
     check_writable(folder / TRIES)
     command = f"python -m agents tune-baselines --tries {tries} --patients {patients} --seed {seed}"
+    command += f" --repetitions {repetitions}" if repetitions > 1 else ""
     found: dict[str, list[Try]] = {}
     with tqdm(total=len(tunable()) * tries, unit="try", leave=False, disable=None, file=sys.stderr) as bar:
 
@@ -40,7 +42,7 @@ def tune_baselines(
             bar.update()
 
         for name in tunable():
-            found[name] = tune(name, tries, patients, seed, workers=workers, progress=progress)
+            found[name] = tune(name, tries, patients, seed, workers=workers, progress=progress, repetitions=repetitions)
     for path, text in ((folder / Path(FILE).name, _yaml(found, command)), (folder / TRIES, _table(found, command))):
         with whole_file(path) as file:
             file.write(text)

@@ -1,0 +1,88 @@
+"""A critic that sees more than the policy (Pinto et al. 2018, arXiv:1710.06542): the patient, whom no sensor shows.
+
+What a patient answers to an error comes seconds later and lies in the effort, which no sensor shows. A critic that sees
+it knows at once what an error was worth. The policy's own inputs stay those of its sensors, so that it acts anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import MlpExtractor
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+
+class TwoViews(nn.Module):
+    """Layers of actor and critic, each behind its own part of the observation.
+
+    Args:
+        inputs: components of the observation.
+        seen: places of those that the actor sees.
+        net_arch: widths of the layers, as in Stable-Baselines3.
+        activation: between the layers.
+        device: of PyTorch.
+    """
+
+    def __init__(
+        self, inputs: int, seen: Sequence[int], net_arch: Any, activation: type[nn.Module], device: Any
+    ) -> None:
+        super().__init__()
+        self.seen = list(seen)
+        judge = MlpExtractor(inputs, net_arch, activation, device)
+        actor = MlpExtractor(len(self.seen), net_arch, activation, device)
+        self.policy_net, self.value_net = actor.policy_net, judge.value_net
+        self.latent_dim_pi, self.latent_dim_vf = actor.latent_dim_pi, judge.latent_dim_vf
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Latent values of actor and critic."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        """Of what the actor sees."""
+        return self.policy_net(features[:, self.seen])
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        """Of everything."""
+        return self.value_net(features)
+
+
+class TwoViewPolicy(ActorCriticPolicy):
+    """MlpPolicy of PPO with an actor that sees a part of what the critic sees.
+
+    Args:
+        seen: places of the observation's components that the actor sees.
+        given: as for MlpPolicy.
+    """
+
+    def __init__(self, *given: Any, seen: Sequence[int], **more: Any) -> None:
+        self.seen = list(seen)
+        super().__init__(*given, **more)
+
+    def _build_mlp_extractor(self) -> None:
+        layers: Any = TwoViews(self.features_dim, self.seen, self.net_arch, self.activation_fn, self.device)
+        self.mlp_extractor = layers
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return super()._get_constructor_parameters() | {"seen": self.seen}
+
+
+def actor_size(worlds: VecEnv, critic: Sequence[str]) -> int:
+    """Components of an observation, the first ones, that are not for the critic alone.
+
+    Args:
+        worlds: that are observed.
+        critic: groups that only the critic sees.
+    """
+    parts = worlds.get_attr("observation_structure", 0)[0]
+    return sum(part.stop - part.start for part in parts if part.group not in critic)
+
+
+def seen_places(worlds: VecEnv, critic: Sequence[str], filters: int) -> list[int]:
+    """Places of what the actor sees; behind what everybody sees stand its filtered observations (traces.py)."""
+    single: Any = worlds.observation_space
+    actor = actor_size(worlds, critic)
+    return [*range(actor), *range(single.shape[0] - filters * actor, single.shape[0])]
