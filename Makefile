@@ -13,13 +13,14 @@ ALL_STAMP := .venv/installed-all
 # The lower bound in pyproject.toml.
 OLDEST_GYMNASIUM := 1.2.0
 
-.PHONY: help demo test test-slow test-oldest bench lint format docs clean
+.PHONY: help demo test test-slow test-oldest test-rllib bench lint format docs clean
 
 help:
 	@echo "make demo   the paper's four scenarios, then baselines and the learned policy: figures, tables, video, into $(OUT)"
 	@echo "make test   the tests"
 	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
+	@echo "make test-rllib  a training step of RLlib"
 	@echo "make bench  speed, as a table"
 	@echo "make lint   ruff and mypy"
 	@echo "make format rewrite the sources in the project's layout"
@@ -62,6 +63,13 @@ test-oldest: $(TRAIN_STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv/oldest \
 	    gymnasium==$(OLDEST_GYMNASIUM)
 	PYTHONPATH=$(CURDIR)/.venv/oldest $(BIN)/python -m pytest -n $(WORKERS) tests/env
+
+# RLlib pins another Gymnasium than the newest: an environment of its own.
+test-rllib:
+	$(PYTHON) -m venv .venv/rllib
+	.venv/rllib/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
+	    -e . "ray[rllib]" torch pytest pytest-xdist
+	.venv/rllib/bin/python -m pytest tests/agents/test_rllib.py
 
 bench: $(STAMP)
 	$(BIN)/python tests/benchmarks/bench.py

@@ -6,7 +6,7 @@
     register()
     config = PPOConfig().environment("exo/ElbowLift-v0", env_config={"patient": "mixed"})
 
-RLlib of Ray 2.5x wants gymnasium 1.2.2, which this environment runs with too.
+RLlib of Ray 2.60 wants gymnasium 1.2.2, which this environment runs with too (`make test-rllib`).
 """
 
 from __future__ import annotations

@@ -111,16 +111,3 @@ def test_mistakes_are_found_before_anything_runs(said, arguments, tmp_path, caps
     assert main(["sweep", *given, "--out", str(tmp_path / "out")]) == 2
     errors = capsys.readouterr().err
     assert said in errors and errors.count("\n") == 1 and not (tmp_path / "out").exists()
-
-
-def test_rllib_makes_the_environment():
-    pytest.importorskip("ray.rllib")
-    from ray.rllib.env.utils import _gym_env_creator  # noqa: F401
-    from ray.tune.registry import ENV_CREATOR, _global_registry
-
-    from agents.rllib import register
-
-    creator = _global_registry.get(ENV_CREATOR, register())
-    env = creator({"patient": "stroke_mild", "episode_duration": 0.4})
-    observation, _ = env.reset(seed=0)
-    assert observation in env.observation_space
