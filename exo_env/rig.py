@@ -88,7 +88,7 @@ class Rig:
         self.model = Model(system, like=template(mode))
         self.names = {name: k for k, (name, _) in enumerate(self.model.layout.outputs)}
         self._internal = InternalModel.of(Arm(), self.machine, 1.0)
-        self._places, self._hardware = self._find_places(), self._measured()
+        self._places, self._hardware, self._rope = self._find_places(), self._measured(), self._find_rope()
         self._build()
 
     def _build(self) -> None:
@@ -113,6 +113,11 @@ class Rig:
         at = self.model.layout.offset
         fibres = np.array([at[m] for m in MUSCLES])
         return Places(at["forearm"], at[LOWER], at[HANDLE], at[WEIGHT], at[PID], fibres)
+
+    def _find_rope(self) -> int:
+        """Place of the gym rope's length in the numbers of constraints."""
+        calls = [c.element.name for c in self.model.layout.constraints]
+        return int(self.model.tables.values.constraints.par_ptr[calls.index(ROPE)])
 
     def _measured(self) -> Hardware:
         """What is the same for all patients."""
@@ -229,20 +234,10 @@ class Rig:
     def _start(self, known: InternalModel, start: float, activations: np.ndarray, held: np.ndarray) -> None:
         """The world at its start."""
         q, v, layout = self._rest_q, np.zeros(self.model.n_q), self.model.layout
-        rope = put_start(
-            known.arm,
-            known.load,
-            self._hardware,
-            self._places,
-            start,
-            float(self.plant.course[0, 0]),
-            activations,
-            q,
-            v,
-        )
-        call = next(k for k, c in enumerate(layout.constraints) if c.element.name == ROPE)
-        constraints = self.model.tables.values.constraints
-        constraints.par[constraints.par_ptr[call]] = rope
+        numbers = self.model.tables.values.constraints.par
+        numbers[self._rope] = put_start(
+            known.arm, known.load, self._hardware, self._places, start, float(self.plant.course[0, 0]), activations, q, v
+        )  # fmt: skip
         for name, side in zip(COMMANDS, (AGONIST, ANTAGONIST), strict=True):
             if name in self.drive.inputs:
                 q[layout.offset[f"{side}_motor"]] = held[self.drive.inputs.index(name)]
