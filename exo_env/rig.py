@@ -236,7 +236,8 @@ class Rig:
         q, v, layout = self._rest_q, np.zeros(self.model.n_q), self.model.layout
         numbers = self.model.tables.values.constraints.par
         numbers[self._rope] = put_start(
-            known.arm, known.load, self._hardware, self._places, start, float(self.plant.course[0, 0]), activations, q, v
+            known.arm, known.load, self._hardware, self._places, start, float(self.plant.course[0, 0]), activations, q,
+            v,
         )  # fmt: skip
         for name, side in zip(COMMANDS, (AGONIST, ANTAGONIST), strict=True):
             if name in self.drive.inputs:
