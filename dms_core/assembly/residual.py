@@ -208,36 +208,78 @@ def _scatter(part, e, local, factor, values):
 
 
 @compiled
-def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
-    """As evaluate_residual, and the scaled Newton matrix into `values` (see sparsity.newton_pattern)."""
-    floats(w, WORK.r2)[:] = 0.0
-    floats(w, WORK.gmu)[:] = 0.0
+def _begin_newton(pattern, values):
+    """Values zero but for r1, which is linear."""
     values[:] = 0.0
-    h = 1.0 / c0
-    Jq, Jv, Ja, G, W, H = (
-        matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G), matrix(w, WORK.W),
-        matrix(w, WORK.H),
-    )  # fmt: skip
     minus, plus = indices(pattern, NEWTON.minus), indices(pattern, NEWTON.plus)
     for i in range(minus.shape[0]):
         values[minus[i]] -= 1.0
         values[plus[i]] += 1.0
+
+
+@compiled
+def _scatter_dynamic(pattern, e, w, h, values):
+    """The local derivatives of dynamic call e into the Newton matrix."""
+    _scatter(inner(pattern, NEWTON.Jq), e, matrix(w, WORK.Jq), h * h, values)
+    _scatter(inner(pattern, NEWTON.Jv), e, matrix(w, WORK.Jv), h, values)
+    _scatter(inner(pattern, NEWTON.Ja), e, matrix(w, WORK.Ja), 1.0, values)
+
+
+@compiled
+def _scatter_constraint(pattern, e, w, h, values):
+    """The local derivatives of constraint call e into the Newton matrix."""
+    G = matrix(w, WORK.G)
+    _scatter(inner(pattern, NEWTON.G_mu), e, G, -1.0, values)
+    _scatter(inner(pattern, NEWTON.G_lam), e, G, 1.0, values)
+    _scatter(inner(pattern, NEWTON.G_q), e, G, 1.0, values)
+    _scatter(inner(pattern, NEWTON.G_v), e, G, 1.0, values)
+    _scatter(inner(pattern, NEWTON.W), e, matrix(w, WORK.W), h, values)
+    _scatter(inner(pattern, NEWTON.H), e, matrix(w, WORK.H), h * h, values)
+
+
+@compiled
+def _scatter_dynamic_rates(pattern, e, w, values):
+    """The local derivatives of dynamic call e into the matrix of the acceleration problem."""
+    _scatter(inner(pattern, RATES.Jv), e, matrix(w, WORK.Jv), 1.0, values)
+    _scatter(inner(pattern, RATES.Ja), e, matrix(w, WORK.Ja), 1.0, values)
+
+
+@compiled
+def _scatter_constraint_rates(pattern, e, w, values):
+    """The local derivatives of constraint call e into the matrix of the acceleration problem."""
+    G = matrix(w, WORK.G)
+    _scatter(inner(pattern, RATES.G_lam), e, G, 1.0, values)
+    _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
+
+
+@compiled
+def _dynamic_derivatives(calls, e, w):
+    """Values of dynamic call e into the residual, its derivatives into the local arrays."""
+    n = evaluate_dynamic(calls, e, w, 1)
+    _add_dynamic_rows(calls, e, w, n)
+
+
+@compiled
+def _constraint_derivatives(calls, e, w):
+    """Values and forces of constraint call e into the residual, its derivatives into the local arrays; gives n."""
+    n = evaluate_constraint(calls, e, w, 1)
+    add_constraint_values(calls, e, w, n)
+    add_constraint_forces(calls, e, w, n)
+    return n
+
+
+@compiled
+def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
+    """As evaluate_residual, and the scaled Newton matrix into `values` (see sparsity.newton_pattern)."""
+    floats(w, WORK.r2)[:] = 0.0
+    floats(w, WORK.gmu)[:] = 0.0
+    _begin_newton(pattern, values)
     for e in ints(dynamics, CALLS.moving):
-        n = evaluate_dynamic(dynamics, e, w, 1)
-        _add_dynamic_rows(dynamics, e, w, n)
-        _scatter(inner(pattern, NEWTON.Jq), e, Jq, h * h, values)
-        _scatter(inner(pattern, NEWTON.Jv), e, Jv, h, values)
-        _scatter(inner(pattern, NEWTON.Ja), e, Ja, 1.0, values)
+        _dynamic_derivatives(dynamics, e, w)
+        _scatter_dynamic(pattern, e, w, 1.0 / c0, values)
     for e in ints(constraints, CALLS.moving):
-        n = evaluate_constraint(constraints, e, w, 1)
-        add_constraint_values(constraints, e, w, n)
-        add_constraint_forces(constraints, e, w, n)
-        _scatter(inner(pattern, NEWTON.G_mu), e, G, -1.0, values)
-        _scatter(inner(pattern, NEWTON.G_lam), e, G, 1.0, values)
-        _scatter(inner(pattern, NEWTON.G_q), e, G, 1.0, values)
-        _scatter(inner(pattern, NEWTON.G_v), e, G, 1.0, values)
-        _scatter(inner(pattern, NEWTON.W), e, W, h, values)
-        _scatter(inner(pattern, NEWTON.H), e, H, h * h, values)
+        _constraint_derivatives(constraints, e, w)
+        _scatter_constraint(pattern, e, w, 1.0 / c0, values)
 
 
 @compiled
@@ -246,19 +288,31 @@ def evaluate_rates(dynamics, constraints, pattern, w, values):
     floats(w, WORK.r2)[:] = 0.0
     floats(w, WORK.gmu)[:] = 0.0
     values[:] = 0.0
-    Jv, Ja, G = matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G)
     for e in ints(dynamics, CALLS.moving):
-        n = evaluate_dynamic(dynamics, e, w, 1)
-        _add_dynamic_rows(dynamics, e, w, n)
-        _scatter(inner(pattern, RATES.Jv), e, Jv, 1.0, values)
-        _scatter(inner(pattern, RATES.Ja), e, Ja, 1.0, values)
+        _dynamic_derivatives(dynamics, e, w)
+        _scatter_dynamic_rates(pattern, e, w, values)
     for e in ints(constraints, CALLS.moving):
-        n = evaluate_constraint(constraints, e, w, 1)
-        add_constraint_values(constraints, e, w, n)
-        add_constraint_forces(constraints, e, w, n)
+        n = _constraint_derivatives(constraints, e, w)
         _add_acceleration_rows(constraints, e, w, n)
-        _scatter(inner(pattern, RATES.G_lam), e, G, 1.0, values)
-        _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
+        _scatter_constraint_rates(pattern, e, w, values)
+
+
+@compiled
+def evaluate_both(dynamics, constraints, newton, rates, w, c0, newton_values, rate_values):
+    """As evaluate_rates, and with the same derivatives the Newton matrix of a step that begins here."""
+    floats(w, WORK.r2)[:] = 0.0
+    floats(w, WORK.gmu)[:] = 0.0
+    rate_values[:] = 0.0
+    _begin_newton(newton, newton_values)
+    for e in ints(dynamics, CALLS.moving):
+        _dynamic_derivatives(dynamics, e, w)
+        _scatter_dynamic_rates(rates, e, w, rate_values)
+        _scatter_dynamic(newton, e, w, 1.0 / c0, newton_values)
+    for e in ints(constraints, CALLS.moving):
+        n = _constraint_derivatives(constraints, e, w)
+        _add_acceleration_rows(constraints, e, w, n)
+        _scatter_constraint_rates(rates, e, w, rate_values)
+        _scatter_constraint(newton, e, w, 1.0 / c0, newton_values)
 
 
 @compiled

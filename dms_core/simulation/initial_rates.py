@@ -13,8 +13,18 @@ import math
 from dms_core.assembly.arena import flags, floats, indices, inner, ints, number
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.parts import RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
-from dms_core.simulation.state import FACTORISATIONS, MODEL, PIVOT, RATES_FACTORED, STALE, STATE
+from dms_core.simulation.parts import BOTH_MATRICES, RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
+from dms_core.simulation.state import (
+    AGE,
+    C0_FACTORED,
+    CONTRACTION,
+    FACTORISATIONS,
+    MODEL,
+    PIVOT,
+    RATES_FACTORED,
+    STALE,
+    STATE,
+)
 
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-11
@@ -46,11 +56,11 @@ def _change(m, s, share):
 
 
 @compiled
-def _correct(m, s):
-    """Newton correction at the present unknowns; False if the matrix is singular."""
+def _correct(m, s, part):
+    """Newton correction at the present unknowns from the matrix that `part` makes; False if that is singular."""
     w, b = inner(s, STATE.w), floats(s, STATE.rate_b)
     free, active = indices(m, MODEL.free), indices(m, MODEL.active)
-    run_part(m, s, RATE_MATRIX)
+    run_part(m, s, part)
     r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
     n = free.shape[0]
     for i in range(n):
@@ -71,7 +81,7 @@ def _iterate(m, s):
     free = indices(m, MODEL.free)
     share, before = 1.0, math.inf
     for _ in range(MAX_ITERATIONS):
-        if not _correct(m, s):
+        if not _correct(m, s, RATE_MATRIX):
             return False
         largest = 0.0
         for k in range(free.shape[0]):
@@ -131,10 +141,17 @@ def consistent_rates(m, s):
 
 
 @compiled
-def stage_rates(m, s):
-    """As consistent_rates behind a step, whose first-order rates solve their equations: one correction is enough."""
+def stage_rates(m, s, c0):
+    """As consistent_rates behind a step, whose first-order rates solve their equations: one correction is enough.
+
+    The derivatives serve the Newton matrix of the next step as well, which is likely to be as long as the last one.
+    """
+    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
+    clock[C0_FACTORED], clock[CONTRACTION] = c0, 0.0
+    count[FACTORISATIONS] += 1
+    count[AGE] = 0
     _put_state(m, s)
-    if not _correct(m, s) or not _change(m, s, 1.0) < math.inf:
+    if not _correct(m, s, BOTH_MATRICES) or not _change(m, s, 1.0) < math.inf:
         return False
     _take_rates(m, s)
     return True

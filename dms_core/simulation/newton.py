@@ -10,7 +10,7 @@ import math
 from dms_core.assembly.arena import floats, indices, inner, ints
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, run_part
+from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, SINGULAR_PIVOT, run_part
 from dms_core.simulation.state import (
     AGE,
     C0_FACTORED,
@@ -30,10 +30,10 @@ CONVERGED, STALE_MATRIX, DIVERGED, SINGULAR, NOT_FINITE = range(5)
 MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
+DRIFT = 0.002
+"""Contraction that a matrix is taken to lose with each stage, as long as no second iteration has measured it."""
 SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping."""
-SINGULAR_PIVOT = 1e-14
-"""Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
 C0_CHANGE = 0.1
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
@@ -100,6 +100,7 @@ def refresh(m, s, c0):
     count[FACTORISATIONS] += 1
     count[STALE] = 0
     count[AGE] = 0
+    clock[CONTRACTION] = 0.0
     run_part(m, s, NEWTON_MATRIX)
     return clock[PIVOT] > SINGULAR_PIVOT
 
@@ -221,10 +222,11 @@ def newton(m, s, o, c0, close):
             contraction = min(norm / before, 0.99) if before > 0.0 else 0.0
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
-        left = norm * contraction / (1.0 - contraction) if k > 0 else 3.0 * norm * max(contraction, 0.05)
+        expected = 3.0 * max(contraction, DRIFT * (1.0 + count[AGE]))
+        left = norm * (contraction / (1.0 - contraction) if k > 0 else expected)
         if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
             clock[CONTRACTION] = contraction
-            if contraction > SLOW:
+            if k > 1 and contraction > SLOW:
                 count[STALE] = 1
             return CONVERGED, k + 1
         if k >= 3 and not fresh and contraction > SLOW:
