@@ -12,7 +12,7 @@ have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 
 
 import math
 
-from dms_core.assembly.arena import flags, floats, indices, inner, ints
+from dms_core.assembly.arena import flags, floats, inner, ints, naturals
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.newton import CONVERGED, DIVERGED, STALE_MATRIX, newton
@@ -50,7 +50,7 @@ def put_guess(m, s, c0, lam_slope):
 
     Coordinates that are not solved for stay: a guess that nothing corrects would run away from rounding errors.
     """
-    w, second, cq, free = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq), indices(m, MODEL.free)
+    w, second, cq, free = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq), naturals(m, MODEL.free)
     q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
     q_guess, v_guess = floats(s, STATE.q_guess), floats(s, STATE.v_guess)
     lam_n, lam_before, mu_n = floats(s, STATE.lam), floats(s, STATE.lam_before), floats(s, STATE.mu)

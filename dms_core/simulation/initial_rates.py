@@ -10,7 +10,7 @@ which changes first-order rates and accelerations linearly and leaves the matrix
 
 import math
 
-from dms_core.assembly.arena import flags, floats, indices, inner, ints, number
+from dms_core.assembly.arena import flags, floats, inner, ints, naturals, number
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.parts import BOTH_MATRICES, RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
@@ -35,7 +35,7 @@ TOLERANCE = 1e-11
 def _change(m, s, share):
     """Add a share of the correction to the unknowns; gives the largest relative correction."""
     w, second = inner(s, STATE.w), flags(m, MODEL.second)
-    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
+    free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
     scale, x = floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
     v, a, lam = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
     n, largest = free.shape[0], 0.0
@@ -59,7 +59,7 @@ def _change(m, s, share):
 def _correct(m, s, part):
     """Newton correction at the present unknowns from the matrix that `part` makes; False if that is singular."""
     w, b = inner(s, STATE.w), floats(s, STATE.rate_b)
-    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
+    free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
     run_part(m, s, part)
     r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
     n = free.shape[0]
@@ -78,7 +78,7 @@ def _correct(m, s, part):
 def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
     second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
-    free = indices(m, MODEL.free)
+    free = naturals(m, MODEL.free)
     share, before = 1.0, math.inf
     for _ in range(MAX_ITERATIONS):
         if not _correct(m, s, RATE_MATRIX):
@@ -169,7 +169,7 @@ def jump_rates(m, s):
     _put_state(m, s)
     run_part(m, s, RESIDUAL)
     b, r2 = floats(s, STATE.rate_b), floats(inner(s, STATE.w), WORK.r2)
-    free = indices(m, MODEL.free)
+    free = naturals(m, MODEL.free)
     b[:] = 0.0
     for i in range(free.shape[0]):
         b[i] = -r2[free[i]]

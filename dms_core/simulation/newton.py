@@ -7,7 +7,7 @@ iteration contracts; corrections of a step that does not reduce the simplified N
 
 import math
 
-from dms_core.assembly.arena import floats, indices, inner, ints
+from dms_core.assembly.arena import floats, inner, ints, naturals
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, SINGULAR_PIVOT, run_part
@@ -51,7 +51,7 @@ def set_rates(s, c0):
 def right_hand_side(m, s, c0):
     """b = -(r1 / c0, r2 / c0^2, r3, r4 / c0), from the evaluated residual."""
     w, b, cq = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.cq)
-    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
+    free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
     q, v, gmu, r2 = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.gmu), floats(w, WORK.r2)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
     n, k, h = free.shape[0], active.shape[0], 1.0 / c0
@@ -67,7 +67,7 @@ def right_hand_side(m, s, c0):
 @compiled
 def apply(m, s, c0, x, factor):
     """Add factor times the scaled correction x to q, v, lam, mu."""
-    w, free, active = inner(s, STATE.w), indices(m, MODEL.free), indices(m, MODEL.active)
+    w, free, active = inner(s, STATE.w), naturals(m, MODEL.free), naturals(m, MODEL.active)
     q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
     n, k = free.shape[0], active.shape[0]
     for i in range(n):
@@ -82,7 +82,7 @@ def apply(m, s, c0, x, factor):
 @compiled
 def correction_norm(m, s, c0):
     """Largest weighted component of the correction x in q and v, inf if any is not finite."""
-    x, wq, wv, free = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv), indices(m, MODEL.free)
+    x, wq, wv, free = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv), naturals(m, MODEL.free)
     n, largest = free.shape[0], 0.0
     for i in range(n):
         size = max(abs(x[i]) / wq[free[i]], abs(c0 * x[n + i]) / wv[free[i]])
@@ -171,9 +171,9 @@ def close_constraints(m, s, o, c0):
     and solved for with the matrix at hand, at a third of the cost of a full iteration. Velocities are of the size of c0
     times positions, and so is their tolerance.
     """
-    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), indices(m, MODEL.active)
+    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), naturals(m, MODEL.active)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
-    n, k = indices(m, MODEL.free).shape[0], active.shape[0]
+    n, k = naturals(m, MODEL.free).shape[0], active.shape[0]
     for _ in range(MAX_CLOSINGS):
         run_part(m, s, CONSTRAINTS)
         error, error_v = largest_errors(s)
