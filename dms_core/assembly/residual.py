@@ -5,14 +5,19 @@ r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi 
 
 import math
 
-from dms_core.assembly.arena import fields, floats, indices, inner, ints, matrix
+from dms_core.assembly.arena import fields, floats, indices, ints, matrix, naturals
 from dms_core.assembly.calls import call_constraint, call_dynamic, call_sensor, call_signal
-from dms_core.assembly.sparsity import NewtonPattern, Part, RatePattern
+from dms_core.assembly.scatter import (
+    begin_newton,
+    scatter_constraint,
+    scatter_constraint_rates,
+    scatter_dynamic,
+    scatter_dynamic_rates,
+)
 from dms_core.assembly.tables import FUNCTION, HARMONIC, Calls, Signals, Work
 from dms_core.jit import compiled
 
-CALLS, WORK, SIGNALS, PART = fields(Calls), fields(Work), fields(Signals), fields(Part)
-NEWTON, RATES = fields(NewtonPattern), fields(RatePattern)
+CALLS, WORK, SIGNALS = fields(Calls), fields(Work), fields(Signals)
 
 
 @compiled
@@ -53,15 +58,14 @@ def evaluate_inputs(signals, t, before, w):
 
 @compiled
 def gather(calls, e, w):
-    """Copy the local q, v, vdot and inputs of call e; gives the number of local coordinates."""
-    iq, ptr = indices(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)
-    q, v, a = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a)
-    q_l, v_l, a_l = floats(w, WORK.q_l), floats(w, WORK.v_l), floats(w, WORK.a_l)
+    """Copy the local q, v and inputs of call e; gives the number of local coordinates."""
+    iq, ptr = naturals(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)
+    q, v, q_l, v_l = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.q_l), floats(w, WORK.v_l)
     start = ptr[e]
     n = ptr[e + 1] - start
     for i in range(n):
         k = iq[start + i]
-        q_l[i], v_l[i], a_l[i] = q[k], v[k], a[k]
+        q_l[i], v_l[i] = q[k], v[k]
     ptr = ints(calls, CALLS.iu_ptr)
     if ptr[e + 1] > ptr[e]:
         iu, u, u_l = indices(calls, CALLS.iu), matrix(w, WORK.u), matrix(w, WORK.u_l)
@@ -69,6 +73,15 @@ def gather(calls, e, w):
             for j in range(3):
                 u_l[i, j] = u[iu[ptr[e] + i], j]
     return n
+
+
+@compiled
+def gather_accelerations(calls, e, w):
+    """Copy the local vdot of call e."""
+    iq, ptr, a, a_l = naturals(calls, CALLS.iq), ints(calls, CALLS.iq_ptr), floats(w, WORK.a), floats(w, WORK.a_l)
+    start = ptr[e]
+    for i in range(ptr[e + 1] - start):
+        a_l[i] = a[iq[start + i]]
 
 
 @compiled
@@ -97,6 +110,7 @@ def _clear(block, m, n):
 def evaluate_dynamic(calls, e, w, level):
     """Run the dynamic kernel of call e into r_l and, for level 1, Jq, Jv, Ja; gives n."""
     n = gather(calls, e, w)
+    gather_accelerations(calls, e, w)
     r_l = floats(w, WORK.r_l)
     Jq, Jv, Ja = matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja)
     for i in range(n):
@@ -158,15 +172,19 @@ def add_constraint_values(calls, e, w, n):
 @compiled
 def add_constraint_forces(calls, e, w, n):
     """phi_q^T lam into r2 and phi_q^T mu into gmu, of call e."""
-    rows, iq, start = ints(calls, CALLS.row), indices(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)[e]
+    rows, iq, start = ints(calls, CALLS.row), naturals(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)[e]
     lam, mu, r2, gmu, G = (
         floats(w, WORK.lam), floats(w, WORK.mu), floats(w, WORK.r2), floats(w, WORK.gmu), matrix(w, WORK.G),
     )  # fmt: skip
-    for k in range(rows[e + 1] - rows[e]):
-        x, y = lam[rows[e] + k], mu[rows[e] + k]
-        for i in range(n):
-            r2[iq[start + i]] += G[k, i] * x
-            gmu[iq[start + i]] += G[k, i] * y
+    first = rows[e]
+    m = rows[e + 1] - first
+    for i in range(n):
+        x, y = 0.0, 0.0
+        for k in range(m):
+            x += G[k, i] * lam[first + k]
+            y += G[k, i] * mu[first + k]
+        r2[iq[start + i]] += x
+        gmu[iq[start + i]] += y
 
 
 @compiled
@@ -180,7 +198,8 @@ def evaluate_constraints(calls, w):
 @compiled
 def _add_dynamic_rows(calls, e, w, n):
     """r2 += r_l of call e."""
-    r2, r_l, iq, start = floats(w, WORK.r2), floats(w, WORK.r_l), indices(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)[e]
+    r2, r_l = floats(w, WORK.r2), floats(w, WORK.r_l)
+    iq, start = naturals(calls, CALLS.iq), ints(calls, CALLS.iq_ptr)[e]
     for i in range(n):
         r2[iq[start + i]] += r_l[i]
 
@@ -200,11 +219,19 @@ def evaluate_residual(dynamics, constraints, w):
 
 
 @compiled
-def _scatter(part, e, local, factor, values):
-    """values[slot] += factor local[i, j] for the entries of call e."""
-    i, j, slot, ptr = indices(part, PART.i), indices(part, PART.j), indices(part, PART.slot), ints(part, PART.ptr)
-    for k in range(ptr[e], ptr[e + 1]):
-        values[slot[k]] += factor * local[i[k], j[k]]
+def _dynamic_derivatives(calls, e, w):
+    """Values of dynamic call e into the residual, its derivatives into the local arrays."""
+    n = evaluate_dynamic(calls, e, w, 1)
+    _add_dynamic_rows(calls, e, w, n)
+
+
+@compiled
+def _constraint_derivatives(calls, e, w):
+    """Values and forces of constraint call e into the residual, its derivatives into the local arrays; gives n."""
+    n = evaluate_constraint(calls, e, w, 1)
+    add_constraint_values(calls, e, w, n)
+    add_constraint_forces(calls, e, w, n)
+    return n
 
 
 @compiled
@@ -212,32 +239,13 @@ def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
     """As evaluate_residual, and the scaled Newton matrix into `values` (see sparsity.newton_pattern)."""
     floats(w, WORK.r2)[:] = 0.0
     floats(w, WORK.gmu)[:] = 0.0
-    values[:] = 0.0
-    h = 1.0 / c0
-    Jq, Jv, Ja, G, W, H = (
-        matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G), matrix(w, WORK.W),
-        matrix(w, WORK.H),
-    )  # fmt: skip
-    minus, plus = indices(pattern, NEWTON.minus), indices(pattern, NEWTON.plus)
-    for i in range(minus.shape[0]):
-        values[minus[i]] -= 1.0
-        values[plus[i]] += 1.0
+    begin_newton(pattern, values)
     for e in ints(dynamics, CALLS.moving):
-        n = evaluate_dynamic(dynamics, e, w, 1)
-        _add_dynamic_rows(dynamics, e, w, n)
-        _scatter(inner(pattern, NEWTON.Jq), e, Jq, h * h, values)
-        _scatter(inner(pattern, NEWTON.Jv), e, Jv, h, values)
-        _scatter(inner(pattern, NEWTON.Ja), e, Ja, 1.0, values)
+        _dynamic_derivatives(dynamics, e, w)
+        scatter_dynamic(pattern, e, w, 1.0 / c0, values)
     for e in ints(constraints, CALLS.moving):
-        n = evaluate_constraint(constraints, e, w, 1)
-        add_constraint_values(constraints, e, w, n)
-        add_constraint_forces(constraints, e, w, n)
-        _scatter(inner(pattern, NEWTON.G_mu), e, G, -1.0, values)
-        _scatter(inner(pattern, NEWTON.G_lam), e, G, 1.0, values)
-        _scatter(inner(pattern, NEWTON.G_q), e, G, 1.0, values)
-        _scatter(inner(pattern, NEWTON.G_v), e, G, 1.0, values)
-        _scatter(inner(pattern, NEWTON.W), e, W, h, values)
-        _scatter(inner(pattern, NEWTON.H), e, H, h * h, values)
+        _constraint_derivatives(constraints, e, w)
+        scatter_constraint(pattern, e, w, 1.0 / c0, values)
 
 
 @compiled
@@ -246,19 +254,33 @@ def evaluate_rates(dynamics, constraints, pattern, w, values):
     floats(w, WORK.r2)[:] = 0.0
     floats(w, WORK.gmu)[:] = 0.0
     values[:] = 0.0
-    Jv, Ja, G = matrix(w, WORK.Jv), matrix(w, WORK.Ja), matrix(w, WORK.G)
     for e in ints(dynamics, CALLS.moving):
-        n = evaluate_dynamic(dynamics, e, w, 1)
-        _add_dynamic_rows(dynamics, e, w, n)
-        _scatter(inner(pattern, RATES.Jv), e, Jv, 1.0, values)
-        _scatter(inner(pattern, RATES.Ja), e, Ja, 1.0, values)
+        _dynamic_derivatives(dynamics, e, w)
+        scatter_dynamic_rates(pattern, e, w, values)
     for e in ints(constraints, CALLS.moving):
-        n = evaluate_constraint(constraints, e, w, 1)
-        add_constraint_values(constraints, e, w, n)
-        add_constraint_forces(constraints, e, w, n)
+        n = _constraint_derivatives(constraints, e, w)
+        gather_accelerations(constraints, e, w)
         _add_acceleration_rows(constraints, e, w, n)
-        _scatter(inner(pattern, RATES.G_lam), e, G, 1.0, values)
-        _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
+        scatter_constraint_rates(pattern, e, w, values)
+
+
+@compiled
+def evaluate_both(dynamics, constraints, newton, rates, w, c0, newton_values, rate_values):
+    """As evaluate_rates, and with the same derivatives the Newton matrix of a step that begins here."""
+    floats(w, WORK.r2)[:] = 0.0
+    floats(w, WORK.gmu)[:] = 0.0
+    rate_values[:] = 0.0
+    begin_newton(newton, newton_values)
+    for e in ints(dynamics, CALLS.moving):
+        _dynamic_derivatives(dynamics, e, w)
+        scatter_dynamic_rates(rates, e, w, rate_values)
+        scatter_dynamic(newton, e, w, 1.0 / c0, newton_values)
+    for e in ints(constraints, CALLS.moving):
+        n = _constraint_derivatives(constraints, e, w)
+        gather_accelerations(constraints, e, w)
+        _add_acceleration_rows(constraints, e, w, n)
+        scatter_constraint_rates(rates, e, w, rate_values)
+        scatter_constraint(newton, e, w, 1.0 / c0, newton_values)
 
 
 @compiled
@@ -309,6 +331,7 @@ def dense_jacobians(constraints, w, q, G):
 def evaluate_sensor(sensors, e, first, end, w, level):
     """Run the sensor kernel of call e into y_l and, for level 1, its derivatives; lam[first:end] is handed in."""
     n = gather(sensors, e, w)
+    gather_accelerations(sensors, e, w)
     rows = ints(sensors, CALLS.row)
     m = rows[e + 1] - rows[e]
     y_l, lam, lam_l = floats(w, WORK.y_l), floats(w, WORK.lam), floats(w, WORK.lam_l)

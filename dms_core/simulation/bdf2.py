@@ -12,7 +12,7 @@ have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 
 
 import math
 
-from dms_core.assembly.arena import flags, floats, indices, inner, ints
+from dms_core.assembly.arena import flags, floats, inner, ints, naturals
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
 from dms_core.simulation.newton import CONVERGED, DIVERGED, STALE_MATRIX, newton
@@ -23,18 +23,25 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 SDIRK_ERROR = 0.0404
 LOCAL_SHARE = 0.1
 """Share of the tolerance that one step may use up: the errors of hundreds of steps add up."""
+COARSEST_RATE = 0.01
+"""Largest weight of a first-order rate, relative to its size."""
 MAX_AGE = 30
 """Stages after which a factorised matrix is renewed, however well it still contracts."""
 
 
 @compiled
 def set_weights(m, s, o):
-    """Error weights, a share of atol + rtol |y|, from the last accepted values."""
+    """Error weights, a share of atol + rtol |y|, from the last accepted values.
+
+    Rates of first-order coordinates add nothing to the error of a step: Newton's method alone looks at them. Their
+    weight is the whole of that sum, but fine enough for what they enter, such as the curve of force and velocity.
+    """
     q, v, wq, wv = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.wq), floats(s, STATE.wv)
-    scale_q, scale_v = floats(m, MODEL.scale_q), floats(m, MODEL.scale_v)
+    scale_q, scale_v, second = floats(m, MODEL.scale_q), floats(m, MODEL.scale_v), flags(m, MODEL.second)
     for i in range(q.shape[0]):
         wq[i] = LOCAL_SHARE * ((o.atol if o.atol > 0.0 else o.rtol * scale_q[i]) + o.rtol * abs(q[i]))
-        wv[i] = LOCAL_SHARE * ((o.atol if o.atol > 0.0 else o.rtol * scale_v[i]) + o.rtol * abs(v[i]))
+        wv[i] = (o.atol if o.atol > 0.0 else o.rtol * scale_v[i]) + o.rtol * abs(v[i])
+        wv[i] = LOCAL_SHARE * wv[i] if second[i] else min(wv[i], COARSEST_RATE * (scale_v[i] + abs(v[i])))
 
 
 @compiled
@@ -43,7 +50,7 @@ def put_guess(m, s, c0, lam_slope):
 
     Coordinates that are not solved for stay: a guess that nothing corrects would run away from rounding errors.
     """
-    w, second, cq, free = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq), indices(m, MODEL.free)
+    w, second, cq, free = inner(s, STATE.w), flags(m, MODEL.second), floats(s, STATE.cq), naturals(m, MODEL.free)
     q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
     q_guess, v_guess = floats(s, STATE.q_guess), floats(s, STATE.v_guess)
     lam_n, lam_before, mu_n = floats(s, STATE.lam), floats(s, STATE.lam_before), floats(s, STATE.mu)

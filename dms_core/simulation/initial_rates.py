@@ -10,11 +10,21 @@ which changes first-order rates and accelerations linearly and leaves the matrix
 
 import math
 
-from dms_core.assembly.arena import flags, floats, indices, inner, ints, number
+from dms_core.assembly.arena import flags, floats, inner, ints, naturals, number
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.parts import RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
-from dms_core.simulation.state import FACTORISATIONS, MODEL, PIVOT, RATES_FACTORED, STALE, STATE
+from dms_core.simulation.parts import BOTH_MATRICES, RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
+from dms_core.simulation.state import (
+    AGE,
+    C0_FACTORED,
+    CONTRACTION,
+    FACTORISATIONS,
+    MODEL,
+    PIVOT,
+    RATES_FACTORED,
+    STALE,
+    STATE,
+)
 
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-11
@@ -25,7 +35,7 @@ TOLERANCE = 1e-11
 def _change(m, s, share):
     """Add a share of the correction to the unknowns; gives the largest relative correction."""
     w, second = inner(s, STATE.w), flags(m, MODEL.second)
-    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
+    free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
     scale, x = floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
     v, a, lam = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
     n, largest = free.shape[0], 0.0
@@ -46,11 +56,11 @@ def _change(m, s, share):
 
 
 @compiled
-def _correct(m, s):
-    """Newton correction at the present unknowns; False if the matrix is singular."""
+def _correct(m, s, part):
+    """Newton correction at the present unknowns from the matrix that `part` makes; False if that is singular."""
     w, b = inner(s, STATE.w), floats(s, STATE.rate_b)
-    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
-    run_part(m, s, RATE_MATRIX)
+    free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
+    run_part(m, s, part)
     r2, phi_a = floats(w, WORK.r2), floats(w, WORK.phi_a)
     n = free.shape[0]
     for i in range(n):
@@ -68,10 +78,10 @@ def _correct(m, s):
 def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
     second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
-    free = indices(m, MODEL.free)
+    free = naturals(m, MODEL.free)
     share, before = 1.0, math.inf
     for _ in range(MAX_ITERATIONS):
-        if not _correct(m, s):
+        if not _correct(m, s, RATE_MATRIX):
             return False
         largest = 0.0
         for k in range(free.shape[0]):
@@ -131,10 +141,17 @@ def consistent_rates(m, s):
 
 
 @compiled
-def stage_rates(m, s):
-    """As consistent_rates behind a step, whose first-order rates solve their equations: one correction is enough."""
+def stage_rates(m, s, c0):
+    """As consistent_rates behind a step, whose first-order rates solve their equations: one correction is enough.
+
+    The derivatives serve the Newton matrix of the next step as well, which is likely to be as long as the last one.
+    """
+    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
+    clock[C0_FACTORED], clock[CONTRACTION] = c0, 0.0
+    count[FACTORISATIONS] += 1
+    count[AGE] = 0
     _put_state(m, s)
-    if not _correct(m, s) or not _change(m, s, 1.0) < math.inf:
+    if not _correct(m, s, BOTH_MATRICES) or not _change(m, s, 1.0) < math.inf:
         return False
     _take_rates(m, s)
     return True
@@ -152,7 +169,7 @@ def jump_rates(m, s):
     _put_state(m, s)
     run_part(m, s, RESIDUAL)
     b, r2 = floats(s, STATE.rate_b), floats(inner(s, STATE.w), WORK.r2)
-    free = indices(m, MODEL.free)
+    free = naturals(m, MODEL.free)
     b[:] = 0.0
     for i in range(free.shape[0]):
         b[i] = -r2[free[i]]

@@ -7,10 +7,10 @@ iteration contracts; corrections of a step that does not reduce the simplified N
 
 import math
 
-from dms_core.assembly.arena import floats, indices, inner, ints
+from dms_core.assembly.arena import floats, inner, ints, naturals
 from dms_core.assembly.residual import WORK
 from dms_core.jit import compiled
-from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, run_part
+from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, SINGULAR_PIVOT, run_part
 from dms_core.simulation.state import (
     AGE,
     C0_FACTORED,
@@ -30,10 +30,10 @@ CONVERGED, STALE_MATRIX, DIVERGED, SINGULAR, NOT_FINITE = range(5)
 MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
+DRIFT = 0.002
+"""Contraction that a matrix is taken to lose with each stage, as long as no second iteration has measured it."""
 SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping."""
-SINGULAR_PIVOT = 1e-14
-"""Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
 C0_CHANGE = 0.1
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
@@ -51,7 +51,7 @@ def set_rates(s, c0):
 def right_hand_side(m, s, c0):
     """b = -(r1 / c0, r2 / c0^2, r3, r4 / c0), from the evaluated residual."""
     w, b, cq = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.cq)
-    free, active = indices(m, MODEL.free), indices(m, MODEL.active)
+    free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
     q, v, gmu, r2 = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.gmu), floats(w, WORK.r2)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
     n, k, h = free.shape[0], active.shape[0], 1.0 / c0
@@ -67,7 +67,7 @@ def right_hand_side(m, s, c0):
 @compiled
 def apply(m, s, c0, x, factor):
     """Add factor times the scaled correction x to q, v, lam, mu."""
-    w, free, active = inner(s, STATE.w), indices(m, MODEL.free), indices(m, MODEL.active)
+    w, free, active = inner(s, STATE.w), naturals(m, MODEL.free), naturals(m, MODEL.active)
     q, v, lam, mu = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.lam), floats(w, WORK.mu)
     n, k = free.shape[0], active.shape[0]
     for i in range(n):
@@ -82,7 +82,7 @@ def apply(m, s, c0, x, factor):
 @compiled
 def correction_norm(m, s, c0):
     """Largest weighted component of the correction x in q and v, inf if any is not finite."""
-    x, wq, wv, free = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv), indices(m, MODEL.free)
+    x, wq, wv, free = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv), naturals(m, MODEL.free)
     n, largest = free.shape[0], 0.0
     for i in range(n):
         size = max(abs(x[i]) / wq[free[i]], abs(c0 * x[n + i]) / wv[free[i]])
@@ -100,6 +100,7 @@ def refresh(m, s, c0):
     count[FACTORISATIONS] += 1
     count[STALE] = 0
     count[AGE] = 0
+    clock[CONTRACTION] = 0.0
     run_part(m, s, NEWTON_MATRIX)
     return clock[PIVOT] > SINGULAR_PIVOT
 
@@ -170,9 +171,9 @@ def close_constraints(m, s, o, c0):
     and solved for with the matrix at hand, at a third of the cost of a full iteration. Velocities are of the size of c0
     times positions, and so is their tolerance.
     """
-    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), indices(m, MODEL.active)
+    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), naturals(m, MODEL.active)
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
-    n, k = indices(m, MODEL.free).shape[0], active.shape[0]
+    n, k = naturals(m, MODEL.free).shape[0], active.shape[0]
     for _ in range(MAX_CLOSINGS):
         run_part(m, s, CONSTRAINTS)
         error, error_v = largest_errors(s)
@@ -221,10 +222,11 @@ def newton(m, s, o, c0, close):
             contraction = min(norm / before, 0.99) if before > 0.0 else 0.0
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
-        left = norm * contraction / (1.0 - contraction) if k > 0 else 3.0 * norm * max(contraction, 0.05)
+        expected = 3.0 * max(contraction, DRIFT * (1.0 + count[AGE]))
+        left = norm * (contraction / (1.0 - contraction) if k > 0 else expected)
         if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
             clock[CONTRACTION] = contraction
-            if contraction > SLOW:
+            if k > 1 and contraction > SLOW:
                 count[STALE] = 1
             return CONVERGED, k + 1
         if k >= 3 and not fresh and contraction > SLOW:

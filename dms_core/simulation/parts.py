@@ -12,6 +12,7 @@ import numpy as np
 from dms_core.assembly.arena import floats, inner, ints
 from dms_core.assembly.calls import PART, address, call_part
 from dms_core.assembly.residual import (
+    evaluate_both,
     evaluate_constraints,
     evaluate_inputs,
     evaluate_newton,
@@ -20,9 +21,11 @@ from dms_core.assembly.residual import (
 )
 from dms_core.jit import compiled
 from dms_core.simulation.linear_solve import back_substitute, factorise
-from dms_core.simulation.state import BEFORE_JUMP, C0_FACTORED, MODEL, PIVOT, STATE, T_INPUTS
+from dms_core.simulation.state import BEFORE_JUMP, C0_FACTORED, MODEL, PIVOT, STALE, STATE, T_INPUTS
 
-INPUTS, RESIDUAL, CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RATE_MATRIX, RATE_SOLUTION = range(7)
+SINGULAR_PIVOT = 1e-14
+"""Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
+INPUTS, RESIDUAL, CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RATE_MATRIX, RATE_SOLUTION, BOTH_MATRICES = range(8)
 
 
 @compiled
@@ -76,9 +79,26 @@ def _rate_solution(m, s):
     back_substitute(m, MODEL.rate_lu, values, floats(s, STATE.rate_b), floats(s, STATE.rate_x), work)
 
 
+@compiled
+def _both_matrices(m, s):
+    """As _rate_matrix, and the factorised Newton matrix for c0 = clock[C0_FACTORED] of the same state."""
+    clock, w = floats(s, STATE.clock), inner(s, STATE.w)
+    newton, rates = floats(s, STATE.newton_values), floats(s, STATE.rate_values)
+    evaluate_both(
+        inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.newton), inner(m, MODEL.rates), w,
+        clock[C0_FACTORED], newton, rates,
+    )  # fmt: skip
+    clock[PIVOT] = factorise(m, MODEL.newton_lu, newton, floats(s, STATE.newton_work))
+    ints(s, STATE.counts)[STALE] = 0 if clock[PIVOT] > SINGULAR_PIVOT else 1
+    clock[PIVOT] = factorise(m, MODEL.rate_lu, rates, floats(s, STATE.rate_work))
+
+
 def part_addresses() -> np.ndarray:
     """Addresses of the parts in the order of their numbers, compiled or loaded here."""
-    parts = (_inputs, _residual, _constraints, _newton_matrix, _newton_solution, _rate_matrix, _rate_solution)
+    parts = (
+        _inputs, _residual, _constraints, _newton_matrix, _newton_solution, _rate_matrix, _rate_solution,
+        _both_matrices,
+    )  # fmt: skip
     return np.array([address(part, PART, part.__name__) for part in parts], np.int64)
 
 

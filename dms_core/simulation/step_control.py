@@ -190,7 +190,7 @@ def one_step(m, s, o, stop, kept):
     # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2. SDIRK2
     # throughout wants them between two landings only for a record.
     wanted_rates = kept or h == rest if o.one_step == 1 else started
-    if wanted_rates and not (o.one_step == 1 and stage_rates(m, s)) and not consistent_rates(m, s):
+    if wanted_rates and not (o.one_step == 1 and stage_rates(m, s, c0)) and not consistent_rates(m, s):
         return RATES_FAILED
     if equal:
         clock[WORST] = max(clock[WORST], error)

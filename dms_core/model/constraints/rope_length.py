@@ -19,7 +19,6 @@ from dms_core.model.ropes.path import (
     add_path_hessian,
     add_path_rate_gradient,
     moving_path,
-    path_length,
     path_pattern,
     start_length,
 )
@@ -32,8 +31,7 @@ def rope_length(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     if ip[0] > 0:
         psi = u[0, 0]
         phi_t[0, 0], phi_t[0, 1] = -u[0, 1], -u[0, 2]
-    phi[0] = path_length(ip, 1, par, 1, q) - psi
-    add_path_gradient(ip, 1, par, 1, q, 1.0, G[0])
+    phi[0] = add_path_gradient(ip, 1, par, 1, q, 1.0, G[0]) - psi
     if level > 0:
         add_path_rate_gradient(ip, 1, par, 1, q, v, 1.0, W[0])
         add_path_hessian(ip, 1, par, 1, q, lam[0], H)

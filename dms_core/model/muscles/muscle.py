@@ -144,12 +144,11 @@ def fibre_at_rest(par, length, a):
 def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """Tables as described at PATH_INTEGERS and PATH_NUMBERS."""
     m = ip[1]
-    length = path_length(ip, PATH_INTEGERS, par, PATH_NUMBERS, q)
+    length = add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, r)
     act, _ = muscle_activation(ip, q, u)
     sigma, s_l, s_m = tendon_state(par, length, q[m])
     active, passive, by_l, by_v, by_a, passive_l = fibre_state(par, q[m], v[m], act)
     c, c_l = pennation_cosine(par, q[m])
-    add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, r)
     if level > 0:
         add_path_hessian(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, sigma, Jq)
         for i in range(m):

@@ -101,11 +101,14 @@ def path_rate(ip, i, par, j, q, v):
 
 @compiled
 def add_path_gradient(ip, i, par, j, q, factor, x):
-    """x += factor l_q, shape (n,)."""
+    """x += factor l_q, shape (n,); gives l [m]."""
+    total = par[j]
     for k in range(ip[i]):
-        oa, ob, sa, sb, w, _ = _segment(ip, i, par, j, k, q)
+        oa, ob, sa, sb, w, length = _segment(ip, i, par, j, k, q)
+        total += length
         _add_point_gradient(q, ob, w, sb, factor, x)
         _add_point_gradient(q, oa, w, sa, -factor, x)
+    return total
 
 
 @compiled

@@ -1,0 +1,64 @@
+"""Local derivatives of one call into the matrices of sparsity.py.
+
+Indices are read as unsigned: that spares the loops numba's test for negative ones.
+"""
+
+from dms_core.assembly.arena import fields, indices, inner, ints, matrix, naturals
+from dms_core.assembly.sparsity import NewtonPattern, Part, RatePattern
+from dms_core.assembly.tables import Work
+from dms_core.jit import compiled
+
+WORK, PART, NEWTON, RATES = fields(Work), fields(Part), fields(NewtonPattern), fields(RatePattern)
+
+
+@compiled
+def _scatter(part, e, local, factor, values):
+    """values[slot] += factor local[i, j] for the entries of call e."""
+    i, j, slot, ptr = naturals(part, PART.i), naturals(part, PART.j), naturals(part, PART.slot), ints(part, PART.ptr)
+    for k in range(ptr[e], ptr[e + 1]):
+        values[slot[k]] += factor * local[i[k], j[k]]
+
+
+@compiled
+def begin_newton(pattern, values):
+    """Values zero but for r1, which is linear."""
+    values[:] = 0.0
+    minus, plus = indices(pattern, NEWTON.minus), indices(pattern, NEWTON.plus)
+    for i in range(minus.shape[0]):
+        values[minus[i]] -= 1.0
+        values[plus[i]] += 1.0
+
+
+@compiled
+def scatter_dynamic(pattern, e, w, h, values):
+    """The local derivatives of dynamic call e into the Newton matrix."""
+    _scatter(inner(pattern, NEWTON.Jq), e, matrix(w, WORK.Jq), h * h, values)
+    _scatter(inner(pattern, NEWTON.Jv), e, matrix(w, WORK.Jv), h, values)
+    _scatter(inner(pattern, NEWTON.Ja), e, matrix(w, WORK.Ja), 1.0, values)
+
+
+@compiled
+def scatter_constraint(pattern, e, w, h, values):
+    """The local derivatives of constraint call e into the Newton matrix."""
+    G = matrix(w, WORK.G)
+    _scatter(inner(pattern, NEWTON.G_mu), e, G, -1.0, values)
+    _scatter(inner(pattern, NEWTON.G_lam), e, G, 1.0, values)
+    _scatter(inner(pattern, NEWTON.G_q), e, G, 1.0, values)
+    _scatter(inner(pattern, NEWTON.G_v), e, G, 1.0, values)
+    _scatter(inner(pattern, NEWTON.W), e, matrix(w, WORK.W), h, values)
+    _scatter(inner(pattern, NEWTON.H), e, matrix(w, WORK.H), h * h, values)
+
+
+@compiled
+def scatter_dynamic_rates(pattern, e, w, values):
+    """The local derivatives of dynamic call e into the matrix of the acceleration problem."""
+    _scatter(inner(pattern, RATES.Jv), e, matrix(w, WORK.Jv), 1.0, values)
+    _scatter(inner(pattern, RATES.Ja), e, matrix(w, WORK.Ja), 1.0, values)
+
+
+@compiled
+def scatter_constraint_rates(pattern, e, w, values):
+    """The local derivatives of constraint call e into the matrix of the acceleration problem."""
+    G = matrix(w, WORK.G)
+    _scatter(inner(pattern, RATES.G_lam), e, G, 1.0, values)
+    _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
