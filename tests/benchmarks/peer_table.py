@@ -67,7 +67,9 @@ class PeerTable:
         if any(f.system == system for f in self.measured):
             return f"measured: {self._said}"
         days = " and ".join(sorted({f.taken for f in self.shipped if f.system == system}))
-        return f"shipped table {SHIPPED.name}, taken on {days} with the same calibration; `make bench-peers` measures them"
+        return (
+            f"shipped table {SHIPPED.name}, taken on {days} with the same calibration; `make bench-peers` measures them"
+        )
 
 
 def read_shipped() -> list[dict[str, str]]:

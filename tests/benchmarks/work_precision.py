@@ -5,8 +5,8 @@
 Ours: CPU time of one thread, scaled by calibration.py, and the error at the end time or, of the elbow angle, the
 largest over time, against a run at a hundredth of the finest tolerance. Others: out/bench/peers.json where
 `make bench-peers` has written it, else peers.csv, both with the same calibration. Their systems are not the same in
-every detail: Exudyn's whole system is a comparable, simpler one of 8 bodies, OpenSim's arm has wrapping surfaces. MuJoCo
-keeps joints by soft equalities, so that they open; how far is in the legend and beside its times. Its minimal
+every detail: Exudyn's whole system is a comparable, simpler one of 8 bodies, OpenSim's arm has wrapping surfaces.
+MuJoCo keeps joints by soft equalities, so that they open; how far is in the legend and beside its times. Its minimal
 coordinates, which only a tree has, are in the table and not in the picture.
 """
 

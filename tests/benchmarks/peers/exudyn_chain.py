@@ -39,9 +39,7 @@ def chain(links: int) -> tuple[Any, list[Any]]:
             referencePosition=[i + 0.5, 0, 0], inertia=inertia, gravity=[0, -9.81, 0],
             nodeType=exu.NodeType.RotationEulerParameters,
         )  # fmt: skip
-        system.CreateRevoluteJoint(
-            itemNumbers=[before, body], position=[i, 0, 0], axis=[0, 0, 1], useGlobalFrame=True
-        )
+        system.CreateRevoluteJoint(itemNumbers=[before, body], position=[i, 0, 0], axis=[0, 0, 1], useGlobalFrame=True)
         before = body
         bodies.append(body)
     system.Assemble()

@@ -40,8 +40,9 @@ def model(bodies: str, equalities: str, step: float, integrator: str) -> mujoco.
 def soft(links: int, step: float, solref: float) -> mujoco.MjModel:
     """Free bodies, tied."""
     bodies = "".join(f'<body name="b{i}" pos="{i} 0 0"><freejoint/>{INERTIAL}</body>' for i in range(links))
+    others = ["", *(f'body2="b{i}"' for i in range(links - 1))]
     ties = "".join(
-        f'<connect body1="b{i}" {f"body2={chr(34)}b{i - 1}{chr(34)}" if i else ""} anchor="0 0 {z}" solref="{solref} 1"/>'
+        f'<connect body1="b{i}" {others[i]} anchor="0 0 {z}" solref="{solref} 1"/>'
         for i in range(links)
         for z in (-0.1, 0.1)
     )
@@ -50,9 +51,7 @@ def soft(links: int, step: float, solref: float) -> mujoco.MjModel:
 
 def tree(links: int, step: float) -> mujoco.MjModel:
     """Bodies in each other, a hinge each."""
-    inside = "".join(
-        f'<body pos="{min(i, 1)} 0 0"><joint type="hinge" axis="0 0 1"/>{INERTIAL}' for i in range(links)
-    )
+    inside = "".join(f'<body pos="{min(i, 1)} 0 0"><joint type="hinge" axis="0 0 1"/>{INERTIAL}' for i in range(links))
     return model(inside + "</body>" * links, "", step, "RK4")
 
 

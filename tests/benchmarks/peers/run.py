@@ -28,7 +28,7 @@ from tests.benchmarks.peer_table import SHIPPED, write_shipped
 HERE = Path(__file__).parent
 SCRIPTS = {"myosuite_env.py": "myo", "mujoco_chain.py": "myo", "exudyn_chain.py": "exu", "exudyn_elbow.py": "exu"}
 """And the environments that they run in."""
-QUICK = {"myosuite_env.py": ["--steps", "300"], "exudyn_elbow.py": ["--steps", "0.002"]}
+QUICK = {"myosuite_env.py": ["--steps", "300"], "exudyn_elbow.py": ["--steps", "0.002", "0.001"]}
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
