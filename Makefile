@@ -13,7 +13,7 @@ ALL_STAMP := .venv/installed-all
 # The lower bound in pyproject.toml.
 OLDEST_GYMNASIUM := 1.2.0
 
-.PHONY: help demo test test-slow test-oldest test-rllib bench lint format docs clean
+.PHONY: help demo test test-slow test-oldest test-rllib bench bench-peers lint format docs clean
 
 help:
 	@echo "make demo   the paper's four scenarios, then baselines and the learned policy: figures, tables, video, into $(OUT)"
@@ -21,7 +21,8 @@ help:
 	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
 	@echo "make test-rllib  a training step of RLlib"
-	@echo "make bench  speed, as a table"
+	@echo "make bench  speed and growth, as tables and CSV files, into $(OUT)/bench"
+	@echo "make bench-peers  time Exudyn, MuJoCo and MyoSuite in the same way; \`make bench\` prints ratios to them"
 	@echo "make lint   ruff and mypy"
 	@echo "make format rewrite the sources in the project's layout"
 	@echo "make docs   generate docs/model-files.md and the picture of the README"
@@ -71,10 +72,29 @@ test-rllib:
 	    -e . "ray[rllib]" torch pytest pytest-xdist
 	.venv/rllib/bin/python -m pytest tests/agents/test_rllib.py
 
-bench: $(STAMP)
-	$(BIN)/python tests/benchmarks/bench.py
-	$(BIN)/python tests/benchmarks/env_speed.py
-	$(BIN)/python tests/benchmarks/work_precision.py --out $(OUT)/bench
+# One thread each: numerical libraries must not take cores that a table does not tell of. Fifteen minutes in all.
+BENCH := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks
+BENCH_OUT := $(OUT)/bench
+
+bench: $(TRAIN_STAMP)
+	$(BENCH)/bench.py --peers $(BENCH_OUT)/peers.json --out $(BENCH_OUT)/core.csv
+	$(BENCH)/env_speed.py --peers $(BENCH_OUT)/peers.json --out $(BENCH_OUT)/env_speed.csv
+	$(BENCH)/growth.py --out $(BENCH_OUT)/growth.csv
+	$(BENCH)/train_speed.py --out $(BENCH_OUT)/train_speed.csv
+	$(BENCH)/work_precision.py --peers $(BENCH_OUT)/peers.json --out $(BENCH_OUT)
+
+# The other programs, in environments of their own; `make bench` then prints ratios to what was measured here.
+PEERS := tests/benchmarks/peers
+
+.venv-peers/%/installed: $(PEERS)/requirements-%.txt
+	mkdir -p .venv-peers
+	@echo '*' > .venv-peers/.gitignore
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r $<
+	@touch $@
+
+bench-peers: .venv-peers/myo/installed .venv-peers/exu/installed
+	$(PYTHON) $(PEERS)/run.py --venvs .venv-peers --out $(BENCH_OUT)/peers.json
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -91,5 +111,5 @@ docs: $(STAMP)
 	cp $(OUT)/scenarios/fig12_joint_moments.png docs/scenarios.png
 
 clean:
-	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf .venv .venv-peers out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

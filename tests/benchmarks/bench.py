@@ -1,9 +1,9 @@
-"""Speed of the core beside published or measured figures of other programs, as tables.
+"""Speed of the core beside other programs, as tables.
 
     python tests/benchmarks/bench.py [--quick]
 
-CPU seconds of one thread, scaled by calibration.py. The figures of Exudyn 1.13.6 and OpenSim 4.6 were taken on another
-day with the same calibration on a shared two-core machine (their scripts time the same systems; see each table).
+CPU seconds of one thread, scaled by calibration.py. Figures of the others are those that `make bench-peers` left in
+out/bench/peers.json, else those of peers.csv; each table says which.
 """
 
 from __future__ import annotations
@@ -11,91 +11,73 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from dms_core import Model, Simulation, SolverOptions, System, simulate
-from dms_core.model import Constant, Gravity, Revolute, RigidBody
-from exo_env.arm26 import bare_arm
-from exo_env.human import MUSCLES
-from exo_env.scenarios import build, load_scenarios
+from dms_core import Model, Simulation, SolverOptions, simulate
+from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
+from tests.benchmarks.chain_reference import TIP
+from tests.benchmarks.peer_table import MEASURED, Figure, PeerTable, cost_at
+from tests.benchmarks.problems import ANGLE, ARM_TASKS, arm, chain, chain_error, chain_gap, whole_system
 
-CHAIN_TIP = {
-    1: (-0.999966588072, -0.008174517717),
-    2: (-1.662115135816, -1.041466637193),
-    4: (-1.001231213963, -3.607961551270),
-    8: (5.183553317252, -4.878764572808),
-    16: (14.037422088005, -4.905051600163),
-    32: (30.530246507830, -4.905000000057),
-    64: (62.869093243961, -4.905000000000),
-}
-"""Tip of the chain at 1 s [m], from an independent formulation integrated to 1e-12."""
-CHAIN_EXUDYN = {1: (12.2, 1.8e-6), 2: (25.0, 3.9e-6), 4: (47.8, 1.5e-5), 8: (91.8, 1.0e-5), 16: (178.7, 4.0e-7),
-                32: (335.9, 4.2e-8), 64: (695.9, 1.0e-7)}  # fmt: skip
-"""Exudyn's better solver, redundant coordinates, sparse: (us a step, tip error [m])."""
-ARM = {
-    "co-contract": (1.0, {"TRI": 0.10, "BIC": 0.15, "BRA": 0.15}, "58.9 ms at 1.4e-5 rad"),
-    "flex": (0.5, {"TRI": 0.02, "BIC": 0.08, "BRA": 0.08}, "56.4 ms at 8.4e-6 rad"),
-}
-"""Start angle [rad], excitations, and OpenSim's cheapest run at about 1e-5 rad (CPodes, with wrapping surfaces)."""
+TARGET = 1e-4
+"""Error at which costs are compared [rad]."""
+Row = tuple[str, str, float, float, float]
+"""System, setting, error, ms, gap [m]."""
 
 
-def chain(links: int) -> System:
-    """Thin rods of 1 m and 1 kg, hinged to each other and to the ground, horizontal and at rest."""
-    bodies = [
-        RigidBody(name=f"link{i}", mass=1.0, inertia=(1e-3, 1 / 12, 1 / 12), position=(i + 0.5, 0.0, 0.0))
-        for i in range(links)
-    ]
-    hinges = [
-        Revolute(name=f"hinge{i}", body_i=f"link{i - 1}" if i else "ground", body_j=f"link{i}",
-                 point_i=(0.5, 0.0, 0.0) if i else (0.0, 0.0, 0.0), point_j=(-0.5, 0.0, 0.0))
-        for i in range(links)
-    ]  # fmt: skip
-    return System("chain", bodies=bodies, constraints=hinges, forces=[Gravity(name="g", acceleration=(0, -9.81, 0))])
-
-
-def tip(simulation: Simulation, links: int) -> np.ndarray:
-    """Position of the last link's free end [m]."""
-    q = simulation.state.q[7 * (links - 1) : 7 * links]
-    angle = 2.0 * math.atan2(q[6], q[3])
-    return q[:2] + 0.5 * np.array([math.cos(angle), math.sin(angle)])
-
-
-def bench_chain(sizes: list[int]) -> None:
+def bench_chain(sizes: list[int], peers: PeerTable) -> list[Row]:
     """N-link chain, 1 s at a fixed step of 1 ms."""
-    print("\nChain of N links, h = 1 ms, 1 s (Exudyn: the better of its two index-2/3 solvers)")
-    print(
-        f"{'N':>4} {'us/step':>9} {'us/link/step':>13} {'tip error m':>12} "
-        f"{'Exudyn us/step':>15} {'error m':>9} {'ratio':>6}"
-    )
+    versions = sorted({f.program for f in peers.of("chain 8")})
+    print(f"\nChain of N links, h = 1 ms, 1 s, redundant coordinates; others: {', '.join(versions)}, the cheaper of")
+    print("Exudyn's two solvers, and MuJoCo's soft equalities with its own stiffness, whose joints open by `gap`")
+    print(f"    others {peers.origin('chain 8')}")
+    other = f"{'us/step':>7} {'tip m':>8} {'gap m':>8} {'ratio':>6}"
+    print(f"{'N':>4} {'ours us':>9} {'us/link':>7} {'tip m':>8} {'gap m':>8} | Exudyn: {other} | MuJoCo: {other}")
+    rows: list[Row] = []
     for links in sizes:
         model = Model(chain(links))
 
-        def run(model: Model = model) -> Simulation:
-            simulation = Simulation(model, SolverOptions(fixed_step=1e-3))
+        def run(simulation: Simulation) -> Simulation:
             simulation.advance(1.0)
             return simulation
 
-        run()
-        seconds, simulation = normalised(run, 5 if links < 32 else 3)
-        error = float(np.hypot(*(tip(simulation, links) - CHAIN_TIP[links])))
-        us, (peer, peer_error) = seconds * 1e3, CHAIN_EXUDYN[links]
-        print(f"{links:4d} {us:9.1f} {us / links:13.2f} {error:12.1e} {peer:15.1f} {peer_error:9.1e} {peer / us:6.1f}")
+        def prepare(model: Model = model) -> Simulation:
+            return Simulation(model, SolverOptions(fixed_step=1e-3))
+
+        run(prepare())
+        seconds, simulation = normalised(run, 5 if links < 32 else 3, prepare=prepare)
+        us, error, gap = seconds * 1e3, chain_error(simulation, links), chain_gap(simulation)
+        rows.append((f"chain {links}", "h=0.001", error, us, gap))
+        others = "".join(
+            _beside(peers.of(f"chain {links}", name), us) for name in ("Exudyn h=0.001", "MuJoCo solref=0.02 h=0.001")
+        )
+        print(f"{links:4d} {us:9.1f} {us / links:7.2f} {error:8.1e} {gap:8.1e}{others}", flush=True)
+    return rows
 
 
-def bench_precision(title: str, model: Model, angle: str, seconds: float, tolerances: list[float], peer: str) -> None:
-    """Error of an angle against cost, per simulated second."""
-    print(f"\n{title}\n    another program: {peer}")
+def _beside(figures: list[Figure], us: float) -> str:
+    """The cheapest figure, and its cost over ours."""
+    if not figures:
+        return f" | {'-':>15} {'-':>8} {'-':>8} {'-':>6}"
+    best = min(figures, key=lambda f: f.ms)
+    return f" | {best.ms:15.1f} {best.error:8.1e} {best.gap_m:8.1e} {best.ms / us:6.2f}"
+
+
+def bench_precision(title: str, system: str, model: Model, seconds: float, tolerances: list[float],
+                    peers: PeerTable) -> list[Row]:  # fmt: skip
+    """Error of the elbow's angle against cost, per simulated second."""
+    print(f"\n{title}")
     print(
         f"{'rtol':>8} {'error rad':>10} {'ms CPU / s':>11} {'steps / s':>10} {'iterations':>11} {'factorisations':>15}"
     )
     grid = np.linspace(0.0, seconds, 201)
-    exact = simulate(model, seconds, SolverOptions(rtol=tolerances[-1] * 1e-2)).sensors(grid)[angle]
+    exact = simulate(model, seconds, SolverOptions(rtol=tolerances[-1] * 1e-2)).sensors(grid)[ANGLE]
+    rows: list[Row] = []
     for rtol in tolerances:
 
         def run(rtol: float = rtol) -> Simulation:
@@ -104,41 +86,51 @@ def bench_precision(title: str, model: Model, angle: str, seconds: float, tolera
             return simulation
 
         cpu, simulation = normalised(run)
-        error = np.abs(simulation.trajectory().sensors(grid)[angle] - exact).max()
+        error = float(np.abs(simulation.trajectory().sensors(grid)[ANGLE] - exact).max())
+        rows.append((system, f"rtol={rtol:g}", error, cpu / seconds * 1e3, math.nan))
         s = simulation.stats()
-        print(f"{rtol:8.0e} {error:10.1e} {cpu / seconds * 1e3:11.1f} {s.steps / seconds:10.0f} "
+        print(f"{rtol:8.0e} {error:10.1e} {cpu / seconds * 1e3:11.2f} {s.steps / seconds:10.0f} "
               f"{s.newton_iterations:11d} {s.factorisations:15d}")  # fmt: skip
+    compare(system, rows, peers)
+    return rows
 
 
-def bench_arm(tolerances: list[float]) -> None:
-    """arm26 alone, elbow free, six muscles."""
-    for name, (start, excitations, peer) in ARM.items():
-        commands = {muscle: Constant(value=excitations[muscle[:3]]) for muscle in MUSCLES}
-        model = Model(bare_arm(start, commands, 0.02))
-        bench_precision(f"arm26, {name}, via points", model, "elbow_angle.angle", 1.0, tolerances, f"OpenSim {peer}")
+def compare(system: str, rows: list[Row], peers: PeerTable) -> None:
+    """Costs at the target error, log-log between settings; a cheapest run that is more exact is not made cheaper."""
+    ours, figures = cost_at([(r[2], r[3]) for r in rows], TARGET), peers.of(system)
+    print(f"    at {TARGET:g} rad: ours {ours:.2f} ms a simulated second; others {peers.origin(system)}")
+    for program in sorted({f.program for f in figures}):
+        mine = [f for f in figures if f.program == program]
+        for kind in sorted({_kind(f) for f in mine}):
+            ms = cost_at([(f.error, f.ms) for f in mine if _kind(f) == kind], TARGET)
+            said = "never as exact" if math.isnan(ms) else f"{ms:8.1f} ms, ratio {ms / ours:6.1f}"
+            print(f"    {program}, {kind:28} {said}")
 
 
-def bench_system(tolerances: list[float]) -> None:
-    """The full system of scenario 3."""
-    exercise, scenarios = load_scenarios()
-    model, _ = build(scenarios[2], exercise)
-    peer = "Exudyn, a comparable system of 8 bodies: 68 ms at 1.2e-4 rad"
-    title = "Subject, exoskeleton and gym machine, scenario 3"
-    bench_precision(title, model, "elbow_angle.angle", exercise.duration, tolerances, peer)
+def _kind(figure: Figure) -> str:
+    """A setting without its step or accuracy."""
+    return figure.setting.partition(" accuracy")[0].partition(" h=")[0]
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer sizes and tolerances")
-    quick = parser.parse_args(arguments).quick
-    tasks: list[Callable[[], None]] = [
-        lambda: bench_chain([1, 8] if quick else list(CHAIN_TIP)),
-        lambda: bench_arm([1e-5, 1e-6] if quick else [1e-3, 1e-4, 1e-5, 1e-6, 1e-7]),
-        lambda: bench_system([1e-4] if quick else [1e-3, 1e-4, 1e-5, 1e-6]),
-    ]
-    for task in tasks:
-        task()
+    parser.add_argument("--peers", type=Path, default=MEASURED, help="figures of other programs")
+    parser.add_argument("--out", type=Path, help="a CSV of our rows")
+    given = parser.parse_args(arguments)
+    peers, quick = PeerTable(given.peers), given.quick
+    rows = bench_chain([1, 8] if quick else list(TIP), peers)
+    for task in ARM_TASKS:
+        tolerances = [1e-4, 1e-5] if quick else [1e-3, 1e-4, 1e-5, 1e-6, 1e-7]
+        title = f"arm26, {task}, straight through via points (OpenSim's has wrapping surfaces)"
+        rows += bench_precision(title, f"arm26 {task}", arm(task), 1.0, tolerances, peers)
+    model, seconds = whole_system()
+    title = "Subject, exoskeleton and gym machine, scenario 3 (Exudyn: a comparable, simpler system of 8 bodies)"
+    tolerances = [1e-2, 1e-3] if quick else [1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
+    rows += bench_precision(title, "elbow", model, seconds, tolerances, peers)
+    if given.out:
+        csv_file.write(given.out, ("system", "setting", "error", "ms", "gap_m"), rows)
 
 
 if __name__ == "__main__":

@@ -3,14 +3,17 @@
     python tests/benchmarks/work_precision.py [--out docs]
 
 Ours: CPU time of one thread, scaled by calibration.py, and the error at the end time or, of the elbow angle, the
-largest over time, against a run at a hundredth of the finest tolerance. Others: peers.csv, measured on another day with
-the same calibration. Their systems are not the same in every detail; peers.csv says what each is.
+largest over time, against a run at a hundredth of the finest tolerance. Others: out/bench/peers.json where
+`make bench-peers` has written it, else peers.csv, both with the same calibration. Their systems are not the same in
+every detail: Exudyn's whole system is a comparable, simpler one of 8 bodies, OpenSim's arm has wrapping surfaces.
+MuJoCo keeps joints by soft equalities, so that they open; how far is in the legend and beside its times. Its minimal
+coordinates, which only a tree has, are in the table and not in the picture.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,24 +23,24 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from dms_core import Model, Simulation, SolverOptions, simulate
-from dms_core.model import Constant
-from exo_env.arm26 import bare_arm
-from exo_env.human import MUSCLES
-from exo_env.scenarios import build, load_scenarios
-from tests.benchmarks.bench import ARM, CHAIN_TIP, chain, tip
+from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
+from tests.benchmarks.peer_table import MEASURED, Figure, PeerTable
+from tests.benchmarks.problems import ANGLE, arm, chain, chain_error, chain_gap, whole_system
 
-PEERS = Path(__file__).parent / "peers.csv"
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
-Row = tuple[str, str, float, float]
+CHAIN = 8
+PANELS = {"elbow": "whole system, elbow angle [rad]", "arm26 co-contract": "arm26, elbow angle [rad]",
+          f"chain {CHAIN}": f"chain of {CHAIN} links, tip [m]"}  # fmt: skip
+OURS = "exo-env"
 
 
-def angle_rows(system: str, model: Model, seconds: float) -> list[Row]:
-    """(system, setting, error [rad], ms of CPU a simulated second) of each tolerance."""
+def angle_rows(system: str, model: Model, seconds: float, repeats: int) -> list[Figure]:
+    """Error [rad] and ms of CPU a simulated second of each tolerance."""
     grid = np.linspace(0.0, seconds, 201)
-    exact = simulate(model, seconds, SolverOptions(rtol=TOLERANCES[-1] * 1e-2)).sensors(grid)["elbow_angle.angle"]
-    found: list[Row] = []
+    exact = simulate(model, seconds, SolverOptions(rtol=TOLERANCES[-1] * 1e-2)).sensors(grid)[ANGLE]
+    found = []
     for rtol in TOLERANCES:
 
         def run(rtol: float = rtol) -> Simulation:
@@ -45,15 +48,15 @@ def angle_rows(system: str, model: Model, seconds: float) -> list[Row]:
             simulation.advance(seconds)
             return simulation
 
-        cpu, simulation = normalised(run, 3)
-        error = np.abs(simulation.trajectory().sensors(grid)["elbow_angle.angle"] - exact).max()
-        found.append((system, f"rtol={rtol:g}", float(error), cpu / seconds * 1e3))
+        cpu, simulation = normalised(run, repeats)
+        error = float(np.abs(simulation.trajectory().sensors(grid)[ANGLE] - exact).max())
+        found.append(Figure(system, OURS, f"rtol={rtol:g}", error, cpu / seconds * 1e3, math.nan))
     return found
 
 
-def chain_rows(links: int) -> list[Row]:
-    """(system, setting, error of the tip [m], ms of CPU for a second) of each step."""
-    model, found = Model(chain(links)), list[Row]()
+def chain_rows(links: int, repeats: int) -> list[Figure]:
+    """Error of the tip [m] and ms of CPU for a second of each step."""
+    model, found = Model(chain(links)), []
     for h in STEPS:
 
         def run(h: float = h) -> Simulation:
@@ -61,50 +64,49 @@ def chain_rows(links: int) -> list[Row]:
             simulation.advance(1.0)
             return simulation
 
-        cpu, simulation = normalised(run, 3)
-        error = float(np.hypot(*(tip(simulation, links) - CHAIN_TIP[links])))
-        found.append((f"chain {links}", f"h={h:g}", error, cpu * 1e3))
+        cpu, simulation = normalised(run, repeats)
+        error, gap = chain_error(simulation, links), chain_gap(simulation)
+        found.append(Figure(f"chain {links}", OURS, f"h={h:g}", error, cpu * 1e3, gap))
     return found
 
 
-def ours() -> list[Row]:
+def ours(repeats: int) -> list[Figure]:
     """All of our rows."""
-    exercise, scenarios = load_scenarios()
-    model, _ = build(scenarios[2], exercise)
-    rows = angle_rows("elbow", model, exercise.duration)
-    start, excitations, _ = ARM["co-contract"]
-    commands = {muscle: Constant(value=excitations[muscle[:3]]) for muscle in MUSCLES}
-    rows += angle_rows("arm26 co-contract", Model(bare_arm(start, commands, 0.02)), 1.0)
-    return rows + chain_rows(8)
+    model, seconds = whole_system()
+    rows = angle_rows("elbow", model, seconds, repeats)
+    return rows + angle_rows("arm26 co-contract", arm("co-contract"), 1.0, repeats) + chain_rows(CHAIN, repeats)
 
 
-def theirs() -> list[dict[str, str]]:
-    """Rows of peers.csv."""
-    with PEERS.open() as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+def curves(figures: Sequence[Figure]) -> dict[str, list[Figure]]:
+    """Those of other programs by what the legend calls them; dense solvers are slower here, and a tree is no chain."""
+    found: dict[str, list[Figure]] = {}
+    for f in figures:
+        if "ense" not in f.setting and "tree" not in f.setting:
+            kind = f.setting.partition(" accuracy")[0].partition(" h=")[0]
+            found.setdefault(f"{f.program}, {kind}", []).append(f)
+    for name in list(found):
+        gap = max(f.gap_m for f in found[name])
+        # Below a micrometre joints count as closed.
+        if gap > 1e-6:
+            found[f"{name} (joints open by {gap:.0e} m)"] = found.pop(name)
+    return found
 
 
-def draw(path: Path, rows: Sequence[Row], others: Sequence[dict[str, str]]) -> None:
+def draw(path: Path, rows: Sequence[Figure], peers: PeerTable) -> None:
     """A panel a system."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    panels = {"elbow": "whole system, elbow angle [rad]", "arm26 co-contract": "arm26, elbow angle [rad]",
-              "chain 8": "chain of 8 links, tip [m]"}  # fmt: skip
     figure, axes = plt.subplots(1, 3, figsize=(12, 4.2), layout="constrained")
-    for ax, (system, title) in zip(axes, panels.items(), strict=True):
-        mine = [(r[2], r[3]) for r in rows if r[0] == system]
-        ax.loglog(*zip(*mine, strict=True), "o-", color="#0b6e4f", lw=2, label="exo-env")
-        groups: dict[str, list[tuple[float, float]]] = {}
-        for r in others:
-            if r["system"] == system and "Dense" not in r["setting"] and "dense" not in r["setting"]:
-                kind = r["setting"].split(" accuracy")[0].split(" h=")[0]
-                groups.setdefault(f"{r['program']}, {kind}", []).append((float(r["error"]), float(r["ms"])))
-        for k, (name, points) in enumerate(groups.items()):
+    for ax, (system, title) in zip(axes, PANELS.items(), strict=True):
+        mine = [(f.error, f.ms) for f in rows if f.system == system]
+        ax.loglog(*zip(*mine, strict=True), "o-", color="#0b6e4f", lw=2, label=OURS)
+        for k, (name, figures) in enumerate(curves(peers.of(system)).items()):
+            points = sorted((f.error, f.ms) for f in figures)
             style = "s^vDP*"[k % 6] + ("--" if len(points) > 1 else "")
-            ax.loglog(*zip(*sorted(points), strict=True), style, lw=1, ms=5, alpha=0.8, label=name)
+            ax.loglog(*zip(*points, strict=True), style, lw=1, ms=5, alpha=0.8, label=name)
         ax.set(title=title, xlabel="error", ylabel="CPU ms a simulated second")
         # Room for the legend below the curves.
         ax.set_ylim(bottom=0.15 * min(ms for _, ms in mine))
@@ -117,17 +119,20 @@ def main(arguments: list[str] | None = None) -> None:
     """Measure, draw, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of work_precision.png and .csv")
-    out = parser.parse_args(arguments).out
-    out.mkdir(parents=True, exist_ok=True)
-    rows = ours()
-    with (out / "work_precision.csv").open("w", newline="") as file:
-        file.write("# python tests/benchmarks/work_precision.py\n")
-        writer = csv.writer(file)
-        writer.writerow(["system", "setting", "error", "ms"])
-        writer.writerows((r[0], r[1], f"{r[2]:.3g}", f"{r[3]:.4g}") for r in rows)
-    for row in rows:
-        print(f"{row[0]:18} {row[1]:12} {row[2]:9.1e} {row[3]:8.2f} ms")
-    draw(out / "work_precision.png", rows, theirs())
+    parser.add_argument("--peers", type=Path, default=MEASURED, help="figures of other programs")
+    parser.add_argument("--repeats", type=int, default=3, help="of each timing; the median counts")
+    given = parser.parse_args(arguments)
+    peers, rows = PeerTable(given.peers), ours(given.repeats)
+    shown = [*rows, *(f for system in PANELS for f in peers.of(system))]
+    columns = ("system", "program", "setting", "error", "ms", "gap_m")
+    csv_file.write(given.out / "work_precision.csv", columns,
+                   [[getattr(f, name) for name in columns] for f in shown])  # fmt: skip
+    for f in sorted(shown, key=lambda f: list(PANELS).index(f.system)):
+        gap = "" if math.isnan(f.gap_m) else f"  joints open by {f.gap_m:.0e} m"
+        print(f"{f.system:18} {f.program:16} {f.setting:36} {f.error:9.1e} {f.ms:8.2f} ms{gap}")
+    for system in PANELS:
+        print(f"others of {system}: {peers.origin(system)}")
+    draw(given.out / "work_precision.png", rows, peers)
 
 
 if __name__ == "__main__":
