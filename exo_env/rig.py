@@ -41,6 +41,8 @@ PLANNING = 0.05
 """Interval of the motor command's table [s]; a tenth of it would change an activation by 0.002."""
 STILL, BESIDE = 1e-9, 2
 """Rate of the reference below which it rests [rad/s]; samples planned on either side of a movement."""
+FIRST_STEP = 0.5
+"""First step tried in an episode, over the control period: inputs leave rest along straight lines of that length."""
 CLOSED = 1e-10
 """Largest |phi| of a start [m or -], as in dms_core's assembly."""
 
@@ -242,7 +244,7 @@ class Rig:
         for name, side in zip(COMMANDS, (AGONIST, ANTAGONIST), strict=True):
             if name in self.drive.inputs:
                 q[layout.offset[f"{side}_motor"]] = held[self.drive.inputs.index(name)]
-        self.world.begin(q, v)
+        self.world.begin(q, v, FIRST_STEP * self.period)
         run_part(self.model.tables.table, self.world.packed.table, CONSTRAINTS)
         gap = largest_errors(self.world.packed.table)[0]
         if not gap <= CLOSED:

@@ -152,9 +152,12 @@ class World:
         self.state.counts[RESTART] = 1
         return True
 
-    def begin(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Back to t = 0 at another consistent start, shape (n_q,) each; inputs stay as they are."""
-        put_start(self.state, q, v)
+    def begin(self, q: np.ndarray, v: np.ndarray, step: float = 0.0) -> None:
+        """Back to t = 0 at another consistent start, shape (n_q,) each; inputs stay as they are.
+
+        `step` is tried first [s], where something is known of how the inputs will move; 0 takes a careful one.
+        """
+        put_start(self.state, q, v, step)
         self.result = Result.SUCCESS
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:

@@ -128,13 +128,16 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
     return Packed(state)
 
 
-def put_start(state: State, q: np.ndarray, v: np.ndarray) -> None:
-    """Back to t = 0, at q and v of shape (n_q,), as if nothing had been computed; inputs stay."""
+def put_start(state: State, q: np.ndarray, v: np.ndarray, step: float = 0.0) -> None:
+    """Back to t = 0, at q and v of shape (n_q,), as if nothing had been computed; inputs stay.
+
+    `step` is tried first [s]; 0 takes a careful one.
+    """
     n, w = len(q), state.w
     for x in (state.clock, state.counts, state.largest, state.vd, state.lam, state.mu, state.lam_before, w.lam, w.mu):
         x[:] = 0
     state.counts[RESTART] = state.counts[STALE] = 1
-    state.largest[H_LEAST] = np.inf
+    state.largest[H_LEAST], state.clock[H_WANTED] = np.inf, step
     for x in (state.q, state.q_before, w.q[:n]):
         x[:] = q
     for x in (state.v, state.qd, state.v_before, w.v[:n]):
