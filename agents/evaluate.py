@@ -14,6 +14,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from agents.baselines import POLICIES
 from agents.measures import MEASURES, Record, measured
 from agents.policy import Policy
 from agents.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, interquartile_mean, mean
@@ -25,7 +26,7 @@ ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
 OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
 """Measures that are printed of them."""
 COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
-"""Measures whose differences to the first policy are estimated, patient by patient."""
+"""Measures whose differences between policies are estimated, patient by patient."""
 Case = tuple[int, float | None]
 """Seed of an episode and its load [kg], None for the one that the seed draws."""
 
@@ -117,9 +118,8 @@ def results_of(
     """What `evaluate` returns, from the episodes of each policy."""
     found = {}
     for one, those in zip(policies, episodes, strict=True):
-        able = [e for e in those if e["ability"] >= ABLE]
         found[one.name] = {
-            "title": one.title, "summary": summary(those, seed), "summary_able": summary(able, seed),
+            "title": one.title, "summary": summary(those, seed), "summary_able": summary(able_ones(those), seed),
             "difference": differences(those, episodes[0], seed), "episodes": those,
         }  # fmt: skip
     return {
@@ -151,11 +151,17 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
     }
 
 
-def summary(episodes: list[dict[str, Any]], seed: int) -> dict[str, dict[str, float]]:
-    """Estimate of each measure over the patients, by name."""
+def summary(episodes: list[dict[str, Any]], seed: int, trainings: int = 1) -> dict[str, dict[str, float]]:
+    """Estimate of each measure over the patients, by name.
+
+    Args:
+        episodes: of one policy, or of several trainings one after another.
+        seed: of the bootstrap.
+        trainings: how many.
+    """
     found = {}
     for m in MEASURES:
-        values = by_patient(episodes, m.name)
+        values = by_training(episodes, m.name, trainings)
         # A generator for each measure and not for each policy: the same resamples for all policies.
         found[m.name] = asdict(estimate(values, mean if m.rate else interquartile_mean, np.random.default_rng(seed)))
     return found
@@ -169,13 +175,26 @@ def by_patient(episodes: list[dict[str, Any]], measure: str) -> np.ndarray:
     return np.array([np.mean([x for x in v if x is not None and np.isfinite(x)] or [np.nan]) for v in values.values()])
 
 
-def differences(episodes: list[dict[str, Any]], others: list[dict[str, Any]], seed: int) -> dict[str, dict[str, float]]:
-    """Estimates of the mean difference to the first policy, patient by patient."""
+def by_training(episodes: list[dict[str, Any]], measure: str, trainings: int) -> np.ndarray:
+    """`by_patient` of each training, shape (trainings, n)."""
+    n = len(episodes) // trainings
+    return np.array([by_patient(episodes[k * n : (k + 1) * n], measure) for k in range(trainings)])
+
+
+def differences(
+    episodes: list[dict[str, Any]], others: list[dict[str, Any]], seed: int, trainings: int = 1
+) -> dict[str, dict[str, float]]:
+    """Estimates of the mean difference to another policy, patient by patient; `trainings` as in `summary`."""
     found = {}
     for name in COMPARED:
-        values = by_patient(episodes, name) - by_patient(others, name)
+        values = by_training(episodes, name, trainings) - by_patient(others, name)
         found[name] = asdict(estimate(values, mean, np.random.default_rng(seed)))
     return found
+
+
+def able_ones(episodes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Episodes of patients who can do something with their load."""
+    return [e for e in episodes if e["ability"] >= ABLE]
 
 
 def table(results: dict[str, Any]) -> str:
@@ -187,25 +206,39 @@ def table(results: dict[str, Any]) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _rows(results: dict[str, Any], summary: str, measures: Sequence[str]) -> list[list[str]]:
+def _rows(policies: Mapping[str, Any], summary: str, measures: Sequence[str]) -> list[list[str]]:
     """A row a measure."""
     found = []
     for m in MEASURES:
         if m.name in measures:
             label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
-            found.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in results["policies"].values())])
+            found.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in policies.values())])
     return found
 
 
 def table_rows(results: dict[str, Any]) -> list[list[str]]:
     """Cells of the table, the first row its head."""
-    names = list(results["policies"])
-    count = len({e["seed"] for e in results["policies"][names[0]]["episodes"] if e["ability"] >= results["able"]})
-    rows = [["", *names], *_rows(results, "summary", [m.name for m in MEASURES])]
+    policies, seed = results["policies"], results["seed"]
+    names = list(policies)
+    count = len({e["seed"] for e in able_ones(policies[names[0]]["episodes"])})
+    rows = [["", *names], *_rows(policies, "summary", [m.name for m in MEASURES])]
     rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
-    rows += _rows(results, "summary_able", OF_THE_ABLE)
-    rows += [[f"mean difference to {names[0]}, patient by patient", *("" for _ in names)]]
-    return rows + _rows(results, "difference", COMPARED)
+    rows += _rows(policies, "summary_able", OF_THE_ABLE)
+    for other in dict.fromkeys([names[0], best_baseline(policies) or names[0]]):
+        those, said = policies[other]["episodes"], f"mean difference to {other}, patient by patient"
+        for head, kept in ((said, list), (f"{said}, of these {count}", able_ones)):
+            found = {
+                n: {"d": differences(kept(p["episodes"]), kept(those), seed, p.get("trainings", 1))}
+                for n, p in policies.items()
+            }
+            rows += [[head, *("" for _ in names)], *_rows(found, "d", COMPARED)]
+    return rows
+
+
+def best_baseline(policies: Mapping[str, Any]) -> str | None:
+    """Name of the classical policy with the best return."""
+    known = [name for name in policies if name in POLICIES]
+    return max(known, key=lambda name: policies[name]["summary"]["return"]["value"], default=None)
 
 
 def _cell(e: Estimate) -> str:

@@ -13,7 +13,7 @@ from agents import report_figures
 from agents.baselines import POLICIES
 from agents.config import Config
 from agents.courses import Course, course
-from agents.evaluate import differences, table_rows
+from agents.evaluate import able_ones, differences, summary, table_rows
 from agents.learned import find_policy, shipped_policies
 from agents.policy import Policy
 from agents.report_figures import Group
@@ -85,12 +85,33 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
             key = (*(found[k] for k in ("population", "patients", "seed")), settings, *found.get("loads", ()))
             known = evaluations.setdefault(key, {**found, "policies": {}})
             known["policies"] |= found["policies"]
-            first = next(iter(known["policies"].values()))["episodes"]
-            for one in known["policies"].values():
-                one["difference"] = differences(one["episodes"], first, known["seed"])
         else:
             raise InputError(f"'{path}' is neither the folder of a training nor an evaluation.")
+    for known in evaluations.values():
+        known["policies"] |= pooled(known["policies"], known["seed"])
+        first = next(iter(known["policies"].values()))["episodes"]
+        for one in known["policies"].values():
+            one["difference"] = differences(one["episodes"], first, known["seed"], one.get("trainings", 1))
     return trainings, list(evaluations.values())
+
+
+def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """Policies whose titles differ in nothing but the seed, as one: its numbers are means over the trainings."""
+    groups: dict[str, list[Any]] = {}
+    for one in policies.values():
+        name, seeded, _ = one["title"].rpartition(", seed ")
+        if seeded:
+            groups.setdefault(name, []).append(one["episodes"])
+    found = {}
+    for name, parts in groups.items():
+        if len(parts) > 1 and len({len(part) for part in parts}) == 1:
+            episodes, title = [e for part in parts for e in part], f"{name}, {len(parts)} seeds"
+            found[title] = {
+                "title": title, "trainings": len(parts), "episodes": episodes,
+                "summary": summary(episodes, seed, len(parts)),
+                "summary_able": summary(able_ones(episodes), seed, len(parts)),
+            }  # fmt: skip
+    return found
 
 
 def _json(path: Path) -> Any:

@@ -42,15 +42,22 @@ def estimate(values: np.ndarray, statistic: Statistic, generator: np.random.Gene
     """A statistic with its percentile bootstrap interval (Efron 1979).
 
     Args:
-        values: sample, shape (n,); what is not finite is left out.
+        values: sample, shape (n,), or of several trainings, shape (trainings, n): then their mean is estimated, and
+            trainings are resampled too. What is not finite is left out.
         statistic: works along the last axis.
         generator: draws the resamples.
     """
-    kept = np.asarray(values, dtype=float)
-    kept = kept[np.isfinite(kept)]
-    if kept.size == 0:
+    kept = np.atleast_2d(np.asarray(values, dtype=float))
+    kept = kept[:, np.isfinite(kept).all(axis=0)]
+    trainings, n = kept.shape
+    if n == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
-    resampled = statistic(kept[generator.integers(kept.size, size=(RESAMPLES, kept.size))])
+    places = generator.integers(n, size=(RESAMPLES, n))
+    if trainings == 1:
+        resampled = statistic(kept[0][places])
+    else:
+        drawn = generator.multinomial(trainings, np.full(trainings, 1.0 / trainings), size=RESAMPLES)
+        resampled = statistic(np.take_along_axis(drawn @ kept / trainings, places, axis=1))
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(resampled, (tail, 1.0 - tail))
-    return Estimate(float(statistic(kept)), float(low), float(high), kept.size)
+    return Estimate(float(statistic(kept.mean(axis=0))), float(low), float(high), n)

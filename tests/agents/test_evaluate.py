@@ -94,6 +94,19 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.png"]
 
 
+def test_command_takes_repetitions(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    options = ["--policy", "pid", "--patients", "1", "--population", "stroke_mild"]
+    returns = []
+    for k in (1, 2):
+        assert main(["evaluate", *options, "--repetitions", str(k), "--out", str(tmp_path / str(k))]) == 0
+        found = json.loads((tmp_path / str(k) / "evaluation.json").read_text())
+        assert found["settings"] == {"repetitions": k}
+        returns.append(found["policies"]["pid"]["episodes"][0]["measures"]["return"])
+    # The second repetition earns something, and less than the first: effort has decayed.
+    assert 1.2 * returns[0] < returns[1] < 2.0 * returns[0]
+
+
 def test_policies_lists_all(capsys):
     assert main(["policies"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [*POLICIES, *shipped_policies()]

@@ -11,9 +11,10 @@ pytest.importorskip("matplotlib")
 from agents.__main__ import main
 from agents.baselines import policy
 from agents.courses import course
-from agents.evaluate import evaluate
-from agents.report import _again, collected, grouped
+from agents.evaluate import by_patient, evaluate
+from agents.report import _again, collected, grouped, pooled
 from agents.report_figures import on_common_steps
+from agents.statistics import interquartile_mean
 from tests.agents.tiny import config_file
 
 PICTURES = {"learning_curves.png", "pareto.png", "patients.png", "worst_patient.png"}
@@ -97,6 +98,17 @@ def test_evaluations_of_the_same_patients_are_one(evaluated, tmp_path):
     for name, found in one["policies"].items():
         means = [found["summary"]["return"], one["policies"]["pid"]["summary"]["return"]]
         assert found["difference"]["return"]["value"] == pytest.approx(means[0]["value"] - means[1]["value"]), name
+
+
+def test_trainings_that_differ_in_the_seed_are_pooled(evaluated):
+    found = json.loads((evaluated / "evaluation.json").read_text())["policies"]
+    twins = {f"run{k}": {**found[name], "title": f"PPO, seed {k}"} for k, name in enumerate(("pid", "none"))}
+    assert pooled(found | {"run0": twins["run0"]}, 0) == {}
+    both = pooled(found | twins, 0)
+    assert list(both) == ["PPO, 2 seeds"] and both["PPO, 2 seeds"]["trainings"] == 2
+    one, other = (by_patient(found[name]["episodes"], "return") for name in ("pid", "none"))
+    value = both["PPO, 2 seeds"]["summary"]["return"]["value"]
+    assert value == pytest.approx(interquartile_mean((one + other) / 2))
 
 
 def test_evaluations_with_other_loads_stay_apart(evaluated, tmp_path):

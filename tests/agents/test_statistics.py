@@ -34,6 +34,22 @@ def test_interval_is_that_of_scipys_percentile_bootstrap(statistic):
     assert found.high == pytest.approx(other.confidence_interval.high, abs=0.2 * other.standard_error)
 
 
+def test_several_trainings_are_averaged_and_resampled():
+    generator = np.random.default_rng(7)
+    patients = generator.normal(size=50)
+    same, apart = np.tile(patients, (4, 1)), patients + np.array([[-3.0], [-1.0], [1.0], [3.0]])
+    alone, equal, spread = (estimate(v, mean, np.random.default_rng(0)) for v in (patients, same, apart))
+    assert (equal.value, equal.low, equal.high) == pytest.approx((alone.value, alone.low, alone.high))
+    assert spread.value == pytest.approx(alone.value) and spread.count == 50
+    # Errors of patients and trainings add up: sd^2 / 50 + 5 / 4, the ends at 1.96 of its root.
+    wanted = 1.96 * np.sqrt(patients.var() / 50 + 5.0 / 4)
+    # Four trainings have few means, so that quantiles of them are coarse.
+    assert spread.high - spread.value == pytest.approx(wanted, rel=0.15)
+    # A patient who could not be measured in one training counts in none.
+    same[2, 5] = np.nan
+    assert estimate(same, mean, np.random.default_rng(0)).count == 49
+
+
 def test_interval_depends_on_the_seed_alone():
     values = np.random.default_rng(3).normal(size=30)
     first, again, other = (estimate(values, mean, np.random.default_rng(s)) for s in (0, 0, 1))

@@ -12,7 +12,7 @@ from exo_env.distributions import distribution, weighted
 from exo_env.patient import Patient
 from exo_env.population import Population, population, shipped_populations
 
-SHIPPED = ("evaluation", "healthy", "mixed", "stroke_mild", "stroke_severe")
+SHIPPED = ("evaluation", "healthy", "mixed", "stroke_mild", "stroke_severe", "wide")
 P = (np.arange(400) + 0.5) / 400
 """Probabilities at which quantiles are compared."""
 WORSE = {
@@ -50,7 +50,7 @@ def test_choice_and_constant():
     assert weighted((1.0, 0.0), 1.0) == 0
 
 
-def test_five_populations_are_shipped():
+def test_six_populations_are_shipped():
     assert shipped_populations() == SHIPPED
 
 
@@ -67,7 +67,7 @@ def test_shipped_populations_give_patients(name):
 @pytest.mark.parametrize("name", [n for n in SHIPPED if n != "mixed"])
 def test_every_line_of_a_shipped_file_names_a_source_or_is_assumed(name):
     lines = (configs() / "patients" / f"{name}.yaml").read_text().splitlines()
-    if name == "evaluation":
+    if name in ("evaluation", "wide"):
         assert any("All ranges are assumed" in line for line in lines)
         return
     begin = lines.index("fields:")
@@ -75,6 +75,17 @@ def test_every_line_of_a_shipped_file_names_a_source_or_is_assumed(name):
         if ":" in line and not line.strip().startswith("#"):
             remark = line.partition("#")[2] or before.partition("#")[2]
             assert any(word in remark for word in ("assumed", "[", "without effect", "as stroke_mild", "tremor")), line
+
+
+def test_wide_spans_the_three_of_mixed_and_an_eighth_more():
+    wide = Population.shipped("wide")
+    assert "wide" not in Population.shipped("mixed").mixture
+    for field, d in wide.distributions.items():
+        if field == "sex":
+            continue
+        ends = [part.distributions[field].limits() for part in Population.shipped("mixed").parts]
+        low, high = min(e[0] for e in ends), max(e[-1] for e in ends)
+        assert d.limits()[0] <= low and high <= d.limits()[-1], field
 
 
 def test_same_seed_same_patients_other_seed_others():
