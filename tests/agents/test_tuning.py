@@ -83,7 +83,10 @@ def test_command_writes_what_the_policies_read(tmp_path, capsys, monkeypatch):
     signature = inspect.signature(tune)
     assert list(signature.parameters)[:4] == ["policy", "tries", "patients", "seed"]
     monkeypatch.setattr(
-        "agents.tune_command.tune", lambda *a, workers, progress: tune(*a, workers=workers, progress=progress, **SHORT)
+        "agents.tune_command.tune",
+        lambda *a, workers, progress, repetitions: tune(
+            *a, workers=workers, progress=progress, repetitions=repetitions, **SHORT
+        ),
     )
     assert main(["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]) == 0
     assert "pid_yielding" in capsys.readouterr().out
