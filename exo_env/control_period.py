@@ -17,7 +17,7 @@ import numpy as np
 from dms_core.assembly.arena import Packed, fields, floats, inner, ints, matrix
 from dms_core.assembly.residual import SIGNALS
 from dms_core.assembly.sensing import read_sensors
-from dms_core.simulation.state import RESTART, STATE, Options, T
+from dms_core.simulation.state import STATE, Options, T
 from dms_core.simulation.step_control import DONE, advance
 from exo_env.effort import SIGN as FLEXION
 from exo_env.effort import STATE as EFFORT
@@ -142,7 +142,10 @@ def ramp(p, k, value):
 
 @compiled
 def set_inputs(p):
-    """Commands and excitations of the coming period."""
+    """Commands and excitations of the coming period.
+
+    Only their slopes jump, which nothing here reads: accelerations go on, and so does the method, which has no past.
+    """
     action, drive, commands = floats(p, PLANT.action), matrix(p, PLANT.drive), floats(p, PLANT.commands)
     for i in range(2):
         wanted, change = drive[i, 0] + drive[i, 1] * action[i], drive[i, 2]
@@ -158,7 +161,6 @@ def set_inputs(p):
     )  # fmt: skip
     for i in range(N):
         ramp(p, 2 + i, excitations[i])
-    ints(inner(p, PLANT.world), STATE.counts)[RESTART] = 1
 
 
 @compiled
