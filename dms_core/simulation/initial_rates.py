@@ -3,7 +3,7 @@
     r2(q, v, vdot, lam) = 0,    phi_q vdot + (phi_q v)_q v + phi_tt = 0
 
 solved for vdot of second-order coordinates, v of first-order ones, and lam. Rigid bodies enter linearly; the fibres'
-force-velocity curve makes it a Newton iteration, halved whenever the residual grows. Two cheaper ways serve SDIRK2:
+force-velocity curve makes it a Newton iteration, shortened where it turns back. Two cheaper ways serve SDIRK2:
 `stage_rates` behind a step, whose first-order rates are right already, and `jump_rates` behind a jump of the inputs,
 which changes first-order rates and accelerations linearly and leaves the matrix of the step before valid.
 """
@@ -27,20 +27,22 @@ from dms_core.simulation.state import (
 )
 
 MAX_ITERATIONS = 60
+SMALL_CHANGE = 0.02
+"""Correction of a first-order rate, over its nominal size, up to which its equation counts as linear."""
 TOLERANCE = 1e-11
 """Relative size of the last correction: the problem is solved to rounding, since all that follows builds on it."""
 
 
 @compiled
-def _change(m, s, share):
-    """Add a share of the correction to the unknowns; gives the largest relative correction."""
+def _change(m, s):
+    """Add the correction to the unknowns; gives the largest relative one."""
     w, second = inner(s, STATE.w), flags(m, MODEL.second)
     free, active = naturals(m, MODEL.free), naturals(m, MODEL.active)
     scale, x = floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
     v, a, lam = floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam)
     n, largest = free.shape[0], 0.0
     for k in range(n):
-        i, change = free[k], share * x[k]
+        i, change = free[k], x[k]
         if second[i]:
             a[i] += change
             size = abs(change) / (1.0 + abs(a[i]))
@@ -51,7 +53,7 @@ def _change(m, s, share):
             return math.inf
         largest = max(largest, size)
     for k in range(active.shape[0]):
-        lam[active[k]] += share * x[n + k]
+        lam[active[k]] += x[n + k]
     return largest
 
 
@@ -75,22 +77,40 @@ def _correct(m, s, part):
 
 
 @compiled
+def _first_order_change(m, s):
+    """Largest correction of a first-order rate, over its nominal size: only these enter nonlinearly."""
+    second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
+    free, largest = naturals(m, MODEL.free), 0.0
+    for k in range(free.shape[0]):
+        if not second[free[k]]:
+            largest = max(largest, abs(x[k]) / scale[free[k]])
+    return largest
+
+
+@compiled
+def _shorten(m, s):
+    """Limit a first-order correction that turns back to half of the one before.
+
+    Newton's method alone may step to and fro over the kink of a force-velocity curve; with this it closes in on it.
+    """
+    second, free = flags(m, MODEL.second), naturals(m, MODEL.free)
+    x, before = floats(s, STATE.rate_x), floats(s, STATE.x_before)
+    for k in range(free.shape[0]):
+        if not second[free[k]]:
+            if x[k] * before[k] < 0.0 and abs(x[k]) > 0.5 * abs(before[k]):
+                x[k] = math.copysign(0.5 * before[k], x[k])
+            before[k] = x[k]
+
+
+@compiled
 def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
-    second, scale, x = flags(m, MODEL.second), floats(m, MODEL.scale_v), floats(s, STATE.rate_x)
-    free = naturals(m, MODEL.free)
-    share, before = 1.0, math.inf
+    floats(s, STATE.x_before)[:] = 0.0
     for _ in range(MAX_ITERATIONS):
         if not _correct(m, s, RATE_MATRIX):
             return False
-        largest = 0.0
-        for k in range(free.shape[0]):
-            if not second[free[k]]:
-                largest = max(largest, abs(x[k]) / scale[free[k]])
-        # Only first-order rates are nonlinear; where their corrections grow, shorten them.
-        share = 0.5 * share if largest > 2.0 * before else min(1.0, 2.0 * share)
-        before = largest
-        change = _change(m, s, share)
+        _shorten(m, s)
+        change = _change(m, s)
         if not change < math.inf:
             return False
         if change < TOLERANCE:
@@ -142,16 +162,22 @@ def consistent_rates(m, s):
 
 @compiled
 def stage_rates(m, s, c0):
-    """As consistent_rates behind a step, whose first-order rates solve their equations: one correction is enough.
+    """As consistent_rates behind a step, whose first-order rates nearly solve their equations: one correction will do.
 
-    The derivatives serve the Newton matrix of the next step as well, which is likely to be as long as the last one.
+    False where it is not, as where a fibre's kink lies between: the rates of a step are as good as its tolerance only.
+    With c0 > 0 the derivatives serve the Newton matrix of the next step as well.
     """
     clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
-    clock[C0_FACTORED], clock[CONTRACTION] = c0, 0.0
-    count[FACTORISATIONS] += 1
-    count[AGE] = 0
+    part = RATE_MATRIX
+    if c0 > 0.0:
+        part = BOTH_MATRICES
+        clock[C0_FACTORED], clock[CONTRACTION] = c0, 0.0
+        count[FACTORISATIONS] += 1
+        count[AGE] = count[STALE] = 0
     _put_state(m, s)
-    if not _correct(m, s, BOTH_MATRICES) or not _change(m, s, 1.0) < math.inf:
+    if not _correct(m, s, part) or not _first_order_change(m, s) < SMALL_CHANGE:
+        return False
+    if not _change(m, s) < math.inf:
         return False
     _take_rates(m, s)
     return True
@@ -174,7 +200,7 @@ def jump_rates(m, s):
     for i in range(free.shape[0]):
         b[i] = -r2[free[i]]
     run_part(m, s, RATE_SOLUTION)
-    if not _change(m, s, 1.0) < math.inf:
+    if not _change(m, s) < math.inf:
         return False
     _take_rates(m, s)
     return True

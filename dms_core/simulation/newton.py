@@ -30,10 +30,8 @@ CONVERGED, STALE_MATRIX, DIVERGED, SINGULAR, NOT_FINITE = range(5)
 MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
-DRIFT = 0.002
-"""Contraction that a matrix is taken to lose with each stage, as long as no second iteration has measured it."""
 SLOW = 0.05
-"""Contraction above which an old matrix is not worth keeping."""
+"""Contraction above which an old matrix is not worth keeping, and below which no other is trusted before it is seen."""
 C0_CHANGE = 0.1
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
@@ -222,8 +220,7 @@ def newton(m, s, o, c0, close):
             contraction = min(norm / before, 0.99) if before > 0.0 else 0.0
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
-        expected = 3.0 * max(contraction, DRIFT * (1.0 + count[AGE]))
-        left = norm * (contraction / (1.0 - contraction) if k > 0 else expected)
+        left = norm * (contraction / (1.0 - contraction) if k > 0 else 3.0 * max(contraction, SLOW))
         if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
             clock[CONTRACTION] = contraction
             if k > 1 and contraction > SLOW:

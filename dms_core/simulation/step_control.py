@@ -180,6 +180,11 @@ def one_step(m, s, o, stop, kept):
             count[REJECTED_NEWTON] += 1
             count[STALE] = 1
             wanted = 0.25 * h
+            # Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
+            if first_try and o.one_step == 1:
+                set_inputs(m, s, clock[T], False)
+                if not consistent_rates(m, s):
+                    return RATES_FAILED
         first_try = False
         if fixed or wanted < o.h_min:
             return STEP_TOO_SMALL if code == CONVERGED else NEWTON_FAILED
@@ -190,7 +195,8 @@ def one_step(m, s, o, stop, kept):
     # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2. SDIRK2
     # throughout wants them between two landings only for a record.
     wanted_rates = kept or h == rest if o.one_step == 1 else started
-    if wanted_rates and not (o.one_step == 1 and stage_rates(m, s, c0)) and not consistent_rates(m, s):
+    stage_c0 = c0 if h == rest else 0.0
+    if wanted_rates and not (o.one_step == 1 and stage_rates(m, s, stage_c0)) and not consistent_rates(m, s):
         return RATES_FAILED
     if equal:
         clock[WORST] = max(clock[WORST], error)
