@@ -117,7 +117,7 @@ def courses(path: Path, columns: Mapping[str, Sequence[Course]]) -> None:
             _course(column, one, COLOURS[k])
         column[0].set_title(f"{title}\n{found[0].who}", fontsize=9)
         column[-1].set_xlabel("time [s]")
-        column[-1].set_ylim(-0.05, 1.05)
+        column[-1].set_ylim(bottom=-0.05)
     for ax, (label, lines) in zip(axes[:, 0], ROWS, strict=True):
         ax.set_ylabel(label)
         for other in axes[list(axes[:, 0]).index(ax)] if lines else ():

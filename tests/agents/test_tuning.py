@@ -82,12 +82,7 @@ def test_mistakes_are_named(arguments, said):
 def test_command_writes_what_the_policies_read(tmp_path, capsys, monkeypatch):
     signature = inspect.signature(tune)
     assert list(signature.parameters)[:4] == ["policy", "tries", "patients", "seed"]
-    monkeypatch.setattr(
-        "agents.tune_command.tune",
-        lambda *a, workers, progress, repetitions: tune(
-            *a, workers=workers, progress=progress, repetitions=repetitions, **SHORT
-        ),
-    )
+    monkeypatch.setattr("agents.tune_command.tune", lambda *a, **given: tune(*a, **given, **SHORT))
     assert main(["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]) == 0
     assert "pid_yielding" in capsys.readouterr().out
     written = read_yaml(tmp_path / "baselines.yml")
