@@ -12,7 +12,7 @@ takes it. The PID's states are coordinates of the DAE; with rope_tension no rope
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,7 +26,6 @@ from exo_env.settings import Settings
 REFERENCE, ASSISTANCE = "psi", "assistance"
 COMMANDS = (f"{AGONIST}_command", f"{ANTAGONIST}_command")
 SETPOINT, FILTER = "setpoint", "setpoint_filter"
-ActionMode = Literal["rope_tension", "pid_setpoint"]
 
 
 class RopeTension(Settings):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Episode:
-    """A patient in the rig; the world is the rig's, and belongs to another episode after the next reset.
+    """A patient in the rig. World, model and effort are those of the present: another patient's after the next reset.
 
     Args:
         rig: device, machine and world.
@@ -35,6 +35,8 @@ class Episode:
 
     def __init__(self, rig: Rig, patient: Patient, load: float, repetition: Repetition, need: Need) -> None:
         self.rig, self.patient, self.load, self.repetition, self.need = rig, patient, load, repetition, need
+        self.course = rig.plant.course.copy()
+        """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at the control times, shape (n, 3)."""
 
     @property
     def drive(self) -> Drive:
@@ -45,11 +47,6 @@ class Episode:
     def times(self) -> np.ndarray:
         """Control times [s]."""
         return self.rig.times
-
-    @property
-    def course(self) -> np.ndarray:
-        """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at the control times, shape (n, 3)."""
-        return self.rig.plant.course
 
     @property
     def world(self) -> World:

@@ -245,9 +245,9 @@ class Rig:
             if name in self.drive.inputs:
                 q[layout.offset[f"{side}_motor"]] = held[self.drive.inputs.index(name)]
         self.world.begin(q, v, FIRST_STEP * self.period)
+        if self.world.settle() is not Result.SUCCESS:
+            raise SimulationError(f"{self.world.result.value} (at the start of an episode)")
         run_part(self.model.tables.table, self.world.packed.table, CONSTRAINTS)
         gap = largest_errors(self.world.packed.table)[0]
         if not gap <= CLOSED:
             raise SimulationError(f"the joints stay open by {gap:.3g} (m or -) at the start of an episode.")
-        if self.world.settle() is not Result.SUCCESS:
-            raise SimulationError(f"{self.world.result.value} (at the start of an episode)")

@@ -46,11 +46,6 @@ def quaternion_product(p, s) -> np.ndarray:
     return np.concatenate([[p0 * s0 - e @ f], p0 * f + s0 * e + np.cross(e, f)])
 
 
-def conjugate(p) -> np.ndarray:
-    """Euler parameters of A(p)^T."""
-    return np.array([p[0], -p[1], -p[2], -p[3]])
-
-
 def g_matrix(p) -> np.ndarray:
     """G(p), shape (3, 4): omega in body axes = 2 G(p) pdot, and pdot = G(p)^T omega / 2."""
     p0, e1, e2, e3 = p

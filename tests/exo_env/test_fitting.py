@@ -46,8 +46,9 @@ def test_numbers_are_those_of_the_declared_patient(mode, patient):
     pairs = [*zip(found.model, wanted.model, strict=True), *zip(found[2:], wanted[2:], strict=True)]
     assert len(pairs) == 6 + len(Numbers._fields) - 2
     for x, y in pairs:
-        # A system of ten equations, solved to rounding, and numbers up to a hundred times those it was solved for.
-        np.testing.assert_allclose(x, y, rtol=1e-11, atol=1e-12 * max(1.0, float(np.abs(y).max(initial=0.0))))
+        # Ten equations solved to rounding, for numbers up to a hundred times those they were solved for.
+        # Parts of a point that cancel are true to rounding of a metre; what is 0 for all is 0.
+        np.testing.assert_allclose(x, y, rtol=1e-11, atol=1e-12)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -55,7 +56,7 @@ def test_numbers_are_those_of_the_declared_patient(mode, patient):
 def test_start_is_that_of_the_declared_patient(mode, angle_deg):
     env = ElbowLiftEnv(action_mode=mode, patient="evaluation")
     env.reset(seed=int(angle_deg), options={"initial_angle_deg": angle_deg})
-    episode, drive = env.episode, DRIVES[mode]()
+    episode = env.episode
     patient, state = episode.patient, episode.world.state
     activations = state.q[[episode.model.layout.index[f"{m}.activation"] for m in MUSCLES]]
     model = declared_model(
@@ -64,7 +65,6 @@ def test_start_is_that_of_the_declared_patient(mode, angle_deg):
     )  # fmt: skip
     rope = rope_number(model)
     assert episode.model.numbers[1][rope] == pytest.approx(model.numbers[1][rope], abs=1e-11)
-    assert type(drive) is type(episode.drive)
     # Lengths and Euler parameters to rounding; tensions are of the order of 100 N.
     np.testing.assert_allclose(state.q, model.start.q, rtol=1e-10, atol=1e-11)
     slow = np.array([not name.endswith((".fibre_length", ".activation", ".tension")) for name in model.layout.names])
@@ -90,4 +90,3 @@ def test_a_rig_forgets_the_patient_before():
         assert one[1:4] == other[1:4]
     for name, value in used.readings().items():
         assert value == fresh.readings()[name], name
-    assert used.episode.model is not fresh.episode.model
