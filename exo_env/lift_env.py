@@ -129,7 +129,7 @@ class ElbowLiftEnv(gymnasium.Env):
     | `control_rate`     | 50               | [Hz]                                                                     |
     | `episode_duration` | `None`           | [s]; `None`: 6 s for each repetition                                     |
     | `repetitions`      | 1                | one begins every `episode_duration / repetitions`, or after the last one |
-    | `rtol`             | `None`           | of the solver; `None` keeps the angle within 0.06 deg                    |
+    | `rtol`             | `None`           | of the solver; `None`: the angle within some 0.05 deg                    |
     | `render_mode`      | `None`           | `"human"` or `"rgb_array"`                                               |
 
     `readings()` gives every sensor of the model without noise. A pickled environment keeps settings and generator, and
