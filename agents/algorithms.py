@@ -9,9 +9,10 @@ describes them: of PPO it changes the noise only.
 from __future__ import annotations
 
 import inspect
+import math
 import re
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Union, get_args, get_origin
 
 import torch
@@ -22,7 +23,7 @@ from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
-from agents.config import Config
+from agents.config import OURS, Config
 from agents.critic import TwoViewPolicy, seen_places
 from dms_core.errors import InputError, choices
 
@@ -38,8 +39,10 @@ NOT_GIVEN = (
     "optimizer_kwargs", "lstm_kwargs",
 )  # fmt: skip
 STATE_DEPENDENT = {"use_sde", "sde_sample_freq"}
-SCHEDULE = re.compile(r"lin_[0-9.]+(?:[eE][-+]?[0-9]+)?")
+SCHEDULE = re.compile(r"lin_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """A value that falls linearly from this one to 0 at the end of the training."""
+SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
+"""Arguments that lie from 0 to 1, and above 0."""
 
 
 def find(name: str) -> type[BaseAlgorithm]:
@@ -66,7 +69,8 @@ def arguments(config: Config) -> dict[str, Any]:
         raise InputError(f"training.start is for ppo and recurrent_ppo, not for {name}.")
     if config.training.critic and (name, config.policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
         raise InputError("training.critic is for the MlpPolicy of ppo, without frame_stack.")
-    _check(name, config.arguments, allowed(algorithm))
+    _check(name, config.arguments, allowed(algorithm), OURS)
+    _check_ranges(name, config.arguments)
     given = config.arguments.get("policy_kwargs", {})
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
     found = {k: _scheduled(v) for k, v in config.arguments.items()}
@@ -124,15 +128,25 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
     return found
 
 
-def _check(who: str, given: Any, known: Mapping[str, Any]) -> None:
-    """Refuses unknown keys and wrong types."""
+def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str] = ()) -> None:
+    """Refuses unknown keys and wrong types; `others`: keys that may stand beside these."""
     if not isinstance(given, Mapping):
         raise InputError(f"{who} = {given!r}; a mapping is wanted.")
     for key, value in given.items():
         if key not in known:
-            raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices(known)}.")
+            raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices([*known, *others])}.")
         if key != "activation_fn" and not fits(value, known[key]):
             raise InputError(f"{who}: {key} = {value!r}; {_wanted(known[key])} is wanted.")
+
+
+def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
+    """Refuses numbers with which nothing is learned, of a fitting type; a schedule is judged by its start."""
+    for key, value in given.items():
+        number = float(value.removeprefix("lin_")) if isinstance(value, str) and SCHEDULE.fullmatch(value) else value
+        if key in SHARES and not 0.0 <= number <= 1.0:
+            raise InputError(f"{who}: {key} = {value!r}; a number from 0 to 1 is wanted.")
+        if key in POSITIVE and not 0.0 < number < math.inf:
+            raise InputError(f"{who}: {key} = {value!r}; a positive number is wanted.")
 
 
 def fits(value: Any, hint: Any) -> bool:

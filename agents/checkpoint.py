@@ -74,7 +74,7 @@ class Store:
             InputError: there is none, or a file is missing, cut off or changed; says what else there is.
         """
         if self.empty:
-            raise InputError(f"'{self.folder}' holds no checkpoint.")
+            raise InputError(f"'{self.folder}' is empty: the training has not reached its first checkpoint.")
         path = self.folder / (self.folder / POINTER).read_text(encoding="utf-8").strip()
         try:
             hashes = json.loads((path / HASHES).read_text(encoding="utf-8"))

@@ -75,7 +75,7 @@ def _started(address: str | None, cpus: int | None) -> Any:
     try:
         import ray
     except ImportError:
-        raise DmsError("Ray is missing; install it with: pip install 'exo-env[sweep]'") from None
+        raise DmsError('Ray is missing; install it with: pip install -c constraints.txt -e ".[sweep]"') from None
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
     try:
         if address is None:

@@ -27,6 +27,8 @@ OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_
 """Measures that are printed of them."""
 COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
 """Measures whose differences between policies are estimated, patient by patient."""
+LEAST = 1e-6
+"""Of what is printed, in the unit of any measure."""
 Case = tuple[int, float | None]
 """Seed of an episode and its load [kg], None for the one that the seed draws."""
 
@@ -198,7 +200,10 @@ def able_ones(episodes: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def table(results: dict[str, Any]) -> str:
-    """What is printed: a row a measure, a column a policy, interval in brackets; then some of who can do something."""
+    """What is printed: a row a measure, a column a policy, interval in brackets; then some of who can do something.
+
+    That second part is left out where everybody can, and differences where there is one policy.
+    """
     rows = table_rows(results)
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
@@ -220,13 +225,16 @@ def table_rows(results: dict[str, Any]) -> list[list[str]]:
     """Cells of the table, the first row its head."""
     policies, seed = results["policies"], results["seed"]
     names = list(policies)
-    count = len({e["seed"] for e in able_ones(policies[names[0]]["episodes"])})
+    everybody = policies[names[0]]["episodes"]
+    able = able_ones(everybody)
+    count, apart = len({e["seed"] for e in able}), len(able) < len(everybody)
     rows = [["", *names], *_rows(policies, "summary", [m.name for m in MEASURES])]
-    rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
-    rows += _rows(policies, "summary_able", OF_THE_ABLE)
-    for other in dict.fromkeys([names[0], best_baseline(policies) or names[0]]):
+    if apart:
+        rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
+        rows += _rows(policies, "summary_able", OF_THE_ABLE)
+    for other in dict.fromkeys([names[0], best_baseline(policies) or names[0]] if len(names) > 1 else []):
         those, said = policies[other]["episodes"], f"mean difference to {other}, patient by patient"
-        for head, kept in ((said, list), (f"{said}, of these {count}", able_ones)):
+        for head, kept in ((said, list), (f"{said}, of these {count}", able_ones))[: 2 if apart else 1]:
             found = {
                 n: {"d": differences(kept(p["episodes"]), kept(those), seed, p.get("trainings", 1))}
                 for n, p in policies.items()
@@ -242,4 +250,6 @@ def best_baseline(policies: Mapping[str, Any]) -> str | None:
 
 
 def _cell(e: Estimate) -> str:
-    return f"{e.value:.3g} [{e.low:.3g}, {e.high:.3g}]"
+    """Value and interval; what is below `LEAST` is round-off, and 0."""
+    value, low, high = (0.0 if abs(x) < LEAST else x for x in (e.value, e.low, e.high))
+    return f"{value:.3g} [{low:.3g}, {high:.3g}]"

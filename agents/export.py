@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,9 @@ def export(
     elif (source / RECORD).is_file():
         folder = RunFolder(source)
         policy = LearnedPolicy.load((folder.checkpoints if last else folder.best).latest())
+        if not last and policy.description.steps == 0:
+            said = f"the best policy of '{source}' is the untrained one (0 steps); --last exports the last checkpoint's"
+            print(f"warning: {said}", file=sys.stderr)
     elif (source / DESCRIPTION).is_file():
         policy = LearnedPolicy.load(source)
     else:
@@ -53,7 +57,7 @@ def export(
 
         write_onnx(policy, out / ONNX)
     elif onnx:
-        print(f"{ONNX} is left out; it needs: pip install 'exo-env[export]'")
+        print(f'{ONNX} is left out; it needs: pip install -c constraints.txt -e ".[export]"')
     d = policy.description
     print(f"{d.title}, {d.steps} steps, {sum(a.size for a in policy.arrays.values())} numbers")
     print(f"written: {out}")

@@ -92,11 +92,13 @@ class LearnedPolicy(Policy):
         """
         folder = Path(folder)
         try:
-            found = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
-            content = (folder / WEIGHTS).read_bytes()
+            file = DESCRIPTION
+            found = json.loads((folder / file).read_text(encoding="utf-8"))
+            file = WEIGHTS
+            content = (folder / file).read_bytes()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise InputError(f"policy '{folder}' cannot be read: {reason}.") from None
+            raise InputError(f"policy '{folder}' cannot be read: {file}: {reason}.") from None
         except ValueError as error:
             raise InputError(f"'{folder / DESCRIPTION}' is no JSON: {error}.") from None
         if not isinstance(found, dict):
@@ -157,8 +159,12 @@ def find_policy(name: str) -> Policy:
         from agents.checkpoint import Store
 
         return LearnedPolicy.load(Store(folder / "best").latest(), name)
-    if folder.is_dir() or "/" in name:
+    if folder.is_dir():
         raise InputError(f"policy '{name}': there is no {DESCRIPTION} in this folder.")
+    if folder.exists():
+        raise InputError(f"policy '{name}' is a file; the folder of a policy or of a training is wanted.")
+    if "/" in name:
+        raise InputError(f"policy '{name}': there is no such folder.")
     known = [*POLICIES, *shipped_policies()]
     raise InputError(f"unknown policy '{name}'. There are: {choices(known)}, and folders of trained policies.")
 

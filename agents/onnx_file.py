@@ -29,7 +29,9 @@ def write_onnx(policy: LearnedPolicy, path: Path) -> None:
     try:
         import onnx
     except ImportError:
-        raise DmsError("ONNX needs the package onnx; install it with: pip install 'exo-env[export]'") from None
+        raise DmsError(
+            'ONNX needs the package onnx; install it with: pip install -c constraints.txt -e ".[export]"'
+        ) from None
     graph = _Graph(policy)
     model = onnx.helper.make_model(
         graph.made(), producer_name="exo_env", producer_version=policy.description.exo_env,

@@ -46,10 +46,12 @@ class RunFolder:
         """A new training.
 
         Raises:
-            InputError: the folder is in use.
+            InputError: the folder is in use, or is a file.
         """
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"output '{self.path}' is a file; a new or empty folder is wanted.")
         # A start that was killed before its record was written leaves no more than these.
-        if self.path.exists() and (not self.path.is_dir() or {p.name for p in self.path.iterdir()} - {CONFIG, LOCK}):
+        if self.path.is_dir() and {p.name for p in self.path.iterdir()} - {CONFIG, LOCK}:
             hint = f"go on with --resume {self.path}, or" if (self.path / RECORD).is_file() else ""
             raise InputError(f"output '{self.path}' is not empty; {hint} choose another --out.".replace("  ", " "))
         check_writable(self.path / RECORD)

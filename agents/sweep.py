@@ -12,7 +12,7 @@ from tyro.conf import arg
 from agents.cluster import share_out
 from agents.config import Config
 from agents.run_folder import EVALUATIONS, RECORD, RunFolder
-from agents.train_command import STOPPED, check_environment, require_training
+from agents.train_command import STOPPED, checked_config, require_training
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable
 
@@ -66,15 +66,11 @@ def planned(
     Raises:
         InputError: a configuration is wrong, or two trainings would share a folder.
     """
-    from agents.algorithms import arguments
-
     if not configs or not seeds or min(seeds) < 0:
         raise InputError("configurations, and seeds from 0, are wanted.")
     shares = []
     for path in configs:
-        config = Config.read(path, changes)
-        arguments(config)
-        check_environment(config.env_kwargs)
+        config = checked_config(path, changes)
         shares += [(config.content(), seed, str(out.resolve() / f"{path.stem}_{seed}")) for seed in seeds]
     folders = [folder for _, _, folder in shares]
     if len(set(folders)) < len(folders):

@@ -64,13 +64,13 @@ def require_training() -> None:
         import stable_baselines3  # noqa: F401
         import tensorboard  # noqa: F401
     except ImportError as error:
-        raise DmsError(f"training needs {error.name}; install it with: pip install 'exo-env[train]'") from None
+        raise DmsError(
+            f'training needs {error.name}; install it with: pip install -c constraints.txt -e ".[train]"'
+        ) from None
 
 
 def _begun(config: Path | None, seed: int, changes: tuple[str, ...], out: Path | None, resume: Path | None) -> Any:
     """Folder, configuration and seed of a new training or of one to go on with."""
-    from agents.algorithms import arguments
-    from agents.config import Config
     from agents.run_folder import RunFolder
 
     if resume is not None:
@@ -87,13 +87,29 @@ def _begun(config: Path | None, seed: int, changes: tuple[str, ...], out: Path |
         raise InputError("--config FILE or --resume DIR is needed; see configs/agents.")
     if seed < 0:
         raise InputError(f"seed = {seed}; a whole number from 0 is wanted.")
-    used = Config.read(config, changes)
     # A mistake shall not leave a folder behind.
-    arguments(used)
-    check_environment(used.env_kwargs)
+    used = checked_config(config, changes)
     folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
     folder.begin(used, seed)
     return folder, used, seed
+
+
+def checked_config(path: Path, changes: tuple[str, ...]) -> Any:
+    """A configuration that can be trained.
+
+    Raises:
+        InputError: names file, key and value.
+    """
+    from agents.algorithms import arguments
+    from agents.config import Config
+
+    found = Config.read(path, changes)
+    try:
+        arguments(found)
+        check_environment(found.env_kwargs)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return found
 
 
 def check_environment(env_kwargs: dict[str, Any]) -> None:

@@ -126,7 +126,9 @@ def _possible(out: Path) -> Path:
     try:
         import imageio  # noqa: F401
     except ImportError:
-        raise DmsError("videos need imageio; install it with: pip install 'exo-env[pictures]'") from None
+        raise DmsError(
+            'videos need imageio; install it with: pip install -c constraints.txt -e ".[pictures]"'
+        ) from None
     if out.suffix == ".mp4":
         try:
             import imageio_ffmpeg

@@ -114,10 +114,32 @@ def test_code_is_never_run(text):
         ("normalize: clip_obs = -1; a positive number", {"normalize": {"clip_obs": -1}}),
         ("env_kwargs = 3; a mapping", {"env_kwargs": 3}),
         ("ppo: unknown key 'env_wrapper'", {"env_wrapper": "a.b"}),
+        ("ppo: gamma = 1.5; a number from 0 to 1 is wanted", {"gamma": 1.5}),
+        ("ppo: gae_lambda = -0.1; a number from 0 to 1 is wanted", {"gae_lambda": -0.1}),
+        ("ppo: gamma = nan; a number from 0 to 1", {"gamma": float("nan")}),
+        ("ppo: learning_rate = -1; a positive number is wanted", {"learning_rate": -1}),
+        ("ppo: learning_rate = 'lin_0.0'; a positive number is wanted", {"learning_rate": "lin_0.0"}),
+        ("ppo: learning_rate = 'lin_1.2.3'; a number or text like lin_3e-4", {"learning_rate": "lin_1.2.3"}),
+        ("ppo: clip_range = 0; a positive number is wanted", {"clip_range": 0}),
     ],
 )
 def test_mistakes_are_named(said, changes):
     refused(said, **changes)
+
+
+@pytest.mark.parametrize(
+    "key", ["n_timesteps", "n_envs", "env_kwargs", "normalize", "policy", "frame_stack", "n_steps"]
+)
+def test_every_key_is_among_those_allowed(key):
+    refused(f" {key},", overrides=["n_timestep=3"])
+
+
+@pytest.mark.parametrize("gamma", [0, 0.0, 1, 1.0])
+def test_ends_of_a_range_belong_to_it(gamma):
+    pytest.importorskip("stable_baselines3")
+    from agents.algorithms import arguments
+
+    assert arguments(Config.of(content(gamma=gamma), "ppo"))["gamma"] == gamma
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,26 @@ def test_who_can_do_something_is_summed_up_apart():
     assert f"of the {len(able)} with ability from 0.2" in table(found)
 
 
+def test_nothing_is_printed_twice():
+    found = run(["none", "pid"])
+    one = run(["pid"])
+    for results, differences in ((found, 2), (one, 0)):
+        for p in results["policies"].values():
+            for e in p["episodes"]:
+                e["ability"] = 1.0
+        said = table(results)
+        assert "with ability" not in said and "of these" not in said
+        assert said.count("mean difference to") == differences
+        assert said.count("work of the device") == 1 + differences
+
+
+def test_round_off_is_printed_as_zero():
+    found = run(["none"])
+    work = found["policies"]["none"]["summary"]["device_work_share"]
+    work |= {"value": 3e-9, "low": -2e-17, "high": 0.0123}
+    assert " 0 [0, 0.0123]\n" in table(found)
+
+
 def test_order_of_policies_does_not_matter():
     one, other = run(["none", "pid"], patients=1), run(["pid", "none"], patients=1)
     for part in ("episodes", "summary", "summary_able"):

@@ -4,6 +4,8 @@ import importlib.util
 import io
 import json
 import pickle
+import shutil
+import sys
 
 import gymnasium
 import numpy as np
@@ -13,8 +15,9 @@ from agents.__main__ import main
 from agents.config import Config
 from agents.learned import Description, LearnedPolicy, find_policy, world_facts
 from agents.network import ACTIVATIONS, Architecture, Network
+from agents.run_folder import RunFolder
 from agents.tensors import from_bytes, to_bytes
-from dms_core.errors import InputError
+from dms_core.errors import DmsError, InputError
 from tests.agents.tiny import config_file, content
 
 PARITY = 1e-6
@@ -25,7 +28,6 @@ PARITY = 1e-6
 def trained(tmp_path_factory):
     """Models trained a little, with their policies in numpy."""
     pytest.importorskip("sb3_contrib")
-    from agents.run_folder import RunFolder
     from agents.train import TrainingRun
 
     found = {}
@@ -175,6 +177,46 @@ def test_command_exports_a_run(algorithm, trained, tmp_path, capsys):
     )
 
 
+def test_a_run_whose_best_policy_is_untrained_is_exported_with_a_warning(trained, tmp_path, capsys):
+    run = trained("ppo", n_timesteps=32)
+    shutil.copytree(run.folder.path, tmp_path / "run")
+    folder, untrained = RunFolder(tmp_path / "run"), run.policy()
+    untrained.description = untrained.description.model_copy(update={"steps": 0})
+    folder.best.save("steps_again", untrained.save)
+    for flags, warned in (([], True), (["--last"], False)):
+        assert main(["export", str(folder.path), "--out", str(tmp_path / "out"), "--no-onnx", *flags]) == 0
+        said = capsys.readouterr().err
+        assert ("is the untrained one (0 steps); --last" in said) == warned
+
+
+def test_a_run_without_checkpoint_is_named(tmp_path, capsys):
+    folder = RunFolder(tmp_path / "run")
+    folder.begin(Config.of(content(), "ppo"), 0)
+    for arguments in (["export", str(folder.path)], ["evaluate", "--policy", str(folder.path)]):
+        assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+        said = capsys.readouterr().err
+        assert "has not reached its first checkpoint" in said and said.count("\n") == 1
+
+
+def test_what_lacks_a_package_says_how_to_install_it(tmp_path, capsys, monkeypatch):
+    from agents.cluster import _started
+    from agents.onnx_file import write_onnx
+    from agents.video import _possible
+
+    folder, _ = made(tmp_path)
+    for package in ("onnx", "ray", "imageio"):
+        monkeypatch.setitem(sys.modules, package, None)
+    for extra, start in (
+        ("sweep", lambda: _started(None, 1)), ("pictures", lambda: _possible(tmp_path / "a.gif")),
+        ("export", lambda: write_onnx(LearnedPolicy.load(folder), tmp_path / "policy.onnx")),
+    ):  # fmt: skip
+        with pytest.raises(DmsError) as caught:
+            start()
+        assert str(caught.value).endswith(f'pip install -c constraints.txt -e ".[{extra}]"')
+    assert main(["export", str(folder), "--out", str(tmp_path / "out")]) == 0
+    assert 'pip install -c constraints.txt -e ".[export]"\n' in capsys.readouterr().out
+
+
 def test_zip_from_elsewhere_needs_trust(trained, tmp_path, capsys):
     run = trained("ppo")
     path, statistics = tmp_path / "model.zip", tmp_path / "vecnormalize.pkl"
@@ -197,8 +239,6 @@ def test_zip_from_elsewhere_needs_trust(trained, tmp_path, capsys):
 
 def test_runs_are_read_without_opening_a_pickle(trained, tmp_path, monkeypatch):
     # Whoever can change a run's files could put code into pickles; none is opened, by export or by going on.
-    import shutil
-
     import cloudpickle
 
     run = trained("sac")
@@ -218,7 +258,7 @@ def test_runs_are_read_without_opening_a_pickle(trained, tmp_path, monkeypatch):
     [
         ("weights.safetensors is cut off or was changed", lambda f: _cut(f / "weights.safetensors")),
         ("is no JSON", lambda f: _cut(f / "policy.json")),
-        ("cannot be read: No such file", lambda f: (f / "weights.safetensors").unlink()),
+        ("cannot be read: weights.safetensors: No such file", lambda f: (f / "weights.safetensors").unlink()),
         ("trained in exo/ElbowLift-v9", lambda f: _edit(f, environment="exo/ElbowLift-v9")),
         ("unknown key 'wings'", lambda f: _edit(f, wings=2)),
         ("format = 2", lambda f: _edit(f, format=2)),
@@ -271,7 +311,11 @@ def test_weights_that_do_not_fit_are_named():
 
 
 def test_unknown_policies_are_named(tmp_path):
-    for name, said in (("nobody", "There are: assist_as_needed"), (str(tmp_path), "no policy.json")):
+    (tmp_path / "a").touch()
+    for name, said in (
+        ("nobody", "There are: assist_as_needed"), (str(tmp_path), "no policy.json"),
+        (str(tmp_path / "nope"), "there is no such folder"), (str(tmp_path / "a"), "is a file; the folder"),
+    ):  # fmt: skip
         with pytest.raises(InputError, match=said):
             find_policy(name)
     with pytest.raises(InputError, match="neither"):
@@ -281,7 +325,6 @@ def test_unknown_policies_are_named(tmp_path):
 
 def test_numpy_needs_no_pytorch(tmp_path):
     import subprocess
-    import sys
 
     folder, _ = made(tmp_path)
     code = (

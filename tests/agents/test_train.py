@@ -220,7 +220,8 @@ def test_loaders_name_files_that_pass_the_hash_but_do_not_fit(tmp_path):
         ("is not the folder of a training", ["--resume", "nowhere"]),
         ("leave out --config", ["--config", "{config}", "--resume", "x"]),
         ("seed = -1", ["--config", "{config}", "--seed", "-1"]),
-        ("unknown population 'martians'", ["--config", "{config}", "--set", "env_kwargs.patient=martians"]),
+        ("ppo.yml' is a file; a new or empty folder", ["--config", "{config}", "--out", "{config}"]),
+        ("ppo.yml: unknown population 'martians'", ["--config", "{config}", "--set", "env_kwargs.patient=martians"]),
         ("env_kwargs: got an unexpected keyword argument 'wings'", ["--config", "{config}", "--set", "env_kwargs.wings=2"]),  # noqa: E501
         ("ppo refuses its arguments", ["--config", "{config}", "--set", "n_steps=1", "n_envs=1"]),
     ],
@@ -236,7 +237,8 @@ def test_mistakes_are_one_message(said, arguments, tmp_path, capsys, monkeypatch
 def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(sys.modules, "sb3_contrib", None)
     assert train("--config", config_file(tmp_path)) == 2
-    assert "training needs sb3_contrib; install it with: pip install 'exo-env[train]'" in capsys.readouterr().err
+    wanted = 'training needs sb3_contrib; install it with: pip install -c constraints.txt -e ".[train]"'
+    assert wanted in capsys.readouterr().err
 
 
 def test_a_start_killed_before_its_record_is_begun_again(tmp_path):
