@@ -41,7 +41,8 @@ def import_pygame() -> Any:
         import pygame
         import pygame.font
     except ImportError:
-        raise DmsError("rendering needs pygame-ce; install it with: pip install 'exo-env[pictures]'") from None
+        hint = 'pip install -c constraints.txt -e ".[pictures]"'
+        raise DmsError(f"rendering needs pygame-ce; install it with: {hint}") from None
     finally:
         if before is None:
             del os.environ[PROMPT]

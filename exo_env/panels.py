@@ -23,7 +23,8 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise DmsError("figures need matplotlib; install it with: pip install 'exo-env[pictures]'") from None
+        hint = 'pip install -c constraints.txt -e ".[pictures]"'
+        raise DmsError(f"figures need matplotlib; install it with: {hint}") from None
 
 
 def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:
