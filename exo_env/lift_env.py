@@ -22,7 +22,7 @@ from exo_env.control_period import READING, STATUS, Plant, finish, run_period
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import NOTHING, SOLVER, Limits, event
-from exo_env.lift_settings import load_distribution, within, worn_device
+from exo_env.lift_settings import MOST_STEPS, SMALLEST_STEP, TIME, load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
 from exo_env.population import Source, population
 from exo_env.readout import Readout
@@ -32,8 +32,6 @@ from exo_env.rig import Rig
 from exo_env.scene import Scene
 
 OPTIONS = ("patient", "load", "reference", "initial_angle_deg")
-SMALLEST_STEP, MOST_STEPS, TIME = 1e-9, 500_000, 6.0
-"""Of the solver in one episode: a run that needs less [s], or more, has failed. Of one repetition [s]."""
 
 
 class ElbowLiftEnv(gymnasium.Env):
@@ -230,10 +228,9 @@ class ElbowLiftEnv(gymnasium.Env):
         for name in options:
             if name not in OPTIONS:
                 raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
-        patients, loads, repetitions = self.population, self.load, self.repetitions
-        patient = patients.sample(self.np_random)
-        load = float(loads.quantile(self.np_random.random()))
-        repetition = repetitions.sample(self.np_random)
+        patient = self.population.sample(self.np_random)
+        load = float(self.load.quantile(self.np_random.random()))
+        repetition = self.repetitions.sample(self.np_random)
         seed = int(self.np_random.integers(2**63))
         fixed = np.random.default_rng(seed)
         if "patient" in options:

@@ -14,6 +14,10 @@ from exo_env.exoskeleton import Exoskeleton
 
 LEAST_LOAD, MOST_LOAD = 0.05, 50.0
 """Weights that the machine takes [kg]."""
+SMALLEST_STEP, MOST_STEPS = 1e-9, 500_000
+"""Of the solver in one episode: a run that needs less [s], or more, has failed."""
+TIME = 6.0
+"""Of one repetition [s]."""
 
 
 def within(value: Any, low: float, high: float) -> bool:
