@@ -107,9 +107,9 @@ def draw(path: Path, rows: Sequence[Figure], peers: PeerTable) -> None:
             points = sorted((f.error, f.ms) for f in figures)
             style = "s^vDP*"[k % 6] + ("--" if len(points) > 1 else "")
             ax.loglog(*zip(*points, strict=True), style, lw=1, ms=5, alpha=0.8, label=name)
-        ax.set(title=title, xlabel="error", ylabel="CPU ms a simulated second")
+        ax.set(title=title, xlabel="error", ylabel="CPU time [ms] per simulated second")
         # Room for the legend below the curves.
-        ax.set_ylim(bottom=0.15 * min(ms for _, ms in mine))
+        ax.set_ylim(bottom=0.05 * min(ms for _, ms in mine))
         ax.grid(True, which="major", alpha=0.3)
         ax.legend(fontsize=6.5, loc="lower left")
     figure.savefig(path, dpi=110)
