@@ -14,6 +14,7 @@ import numpy as np
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.muscles.muscle import fibre_at_rest, fibre_state, pennation_cosine, tendon_state
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
+from dms_core.model.rotations import add, cross, dot, sub, vec
 from exo_env.jit import compiled
 
 TOE_GROWTH = math.expm1(TOE_SHAPE)
@@ -58,26 +59,8 @@ class LoadTable(NamedTuple):
 
 
 @compiled
-def cross(a, b):
-    """Vector product of two triples."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@compiled
-def dot(a, b):
-    """Scalar product of two triples."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@compiled
-def triple(x):
-    """A vector of three numbers as a tuple: rows of arrays are dear inside a loop."""
-    return x[0], x[1], x[2]
-
-
-@compiled
 def row(x, k):
-    """Row k as a tuple."""
+    """Row k as a tuple: an array of it would be dear inside a loop."""
     return x[k, 0], x[k, 1], x[k, 2]
 
 
@@ -94,19 +77,19 @@ def path_geometry(arm, muscle, angle):
 
     Only segments between forearm and ground change; the others are as long as in the frame of their points.
     """
-    n, e = triple(arm.axis), triple(arm.elbow)
+    n, e = vec(arm.axis, 0), vec(arm.elbow, 0)
     c, s = math.cos(angle), math.sin(angle)
     length, lever = 0.0, 0.0
     for k in range(arm.first[muscle] + 1, arm.first[muscle + 1]):
         a, b = row(arm.points, k - 1), row(arm.points, k)
         if arm.moving[k] == arm.moving[k - 1]:
-            d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+            d = sub(b, a)
             length += math.sqrt(dot(d, d))
             continue
         if arm.moving[k - 1]:
             a, b = b, a
         r = turned(n, c, s, b)
-        d = (e[0] + r[0] - a[0], e[1] + r[1] - a[1], e[2] + r[2] - a[2])
+        d = sub(add(e, r), a)
         segment = math.sqrt(dot(d, d))
         length += segment
         lever -= dot(d, cross(n, r)) / segment
@@ -127,15 +110,15 @@ def muscle_moment(arm, angle, activations):
 @compiled
 def needed_moment(arm, load, angle, rate, acceleration):
     """Moment that the muscles must give about the elbow axis [Nm]."""
-    n, g = triple(arm.axis), triple(load.gravity)
+    n, g = vec(arm.axis, 0), vec(load.gravity, 0)
     g_size = math.sqrt(dot(g, g))
     c, s = math.cos(angle), math.sin(angle)
-    grip = triple(load.grip)
-    centre, r = turned(n, c, s, triple(load.centre_of_mass)), turned(n, c, s, grip)
+    grip = vec(load.grip, 0)
+    centre, r = turned(n, c, s, vec(load.centre_of_mass, 0)), turned(n, c, s, grip)
     slope = cross(n, r)
     bend = cross(n, slope)
-    e, p = triple(arm.elbow), triple(load.pulley)
-    d = (e[0] + r[0] - p[0], e[1] + r[1] - p[1], e[2] + r[2] - p[2])
+    e, p = vec(arm.elbow, 0), vec(load.pulley, 0)
+    d = sub(add(e, r), p)
     rope = math.sqrt(dot(d, d))
     rope_1 = dot(d, slope) / rope
     rope_2 = (dot(slope, slope) + dot(d, bend) - rope_1 * rope_1) / rope

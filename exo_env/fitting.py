@@ -101,20 +101,8 @@ def monomials(person: Person, weight: float, times: dict[str, float]) -> np.ndar
     """
     m, h = person.body_mass / MASS_0, person.height / HEIGHT_0
     rise, fall = times["activation_time_constant"], times["deactivation_time_constant"]
-    return np.array(
-        [
-            1.0,
-            h,
-            h * h,
-            m,
-            m * h * h,
-            person.strength * m / h,
-            weight,
-            100.0 * rise,
-            100.0 * fall,
-            0.01 / min(rise, fall),
-        ]
-    )
+    sizes = (1.0, h, h * h, m, m * h * h, weight, person.strength * m / h)
+    return np.array([*sizes, 100.0 * rise, 100.0 * fall, 0.01 / min(rise, fall)])
 
 
 def numbers_of(model: Model, arm: Arm) -> Numbers:

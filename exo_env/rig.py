@@ -13,6 +13,7 @@ import numpy as np
 from dms_core import Model, SolverOptions
 from dms_core.assembly.arena import Packed
 from dms_core.errors import SimulationError
+from dms_core.model.signals import Pieces
 from dms_core.results import Result
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.newton import largest_errors
@@ -78,7 +79,7 @@ class Rig:
         options: SolverOptions,
     ) -> None:
         assert ecosystem.machine is not None
-        self.ecosystem, self.machine, self.mode, self.drive = ecosystem, ecosystem.machine, mode, drive
+        self.ecosystem, self.machine, self.drive = ecosystem, ecosystem.machine, drive
         self.period, self.options, self.observer = period, options, observer
         self.weights, self.limits = weights, limits
         self.times = np.arange(round(duration / period) + 1) * period
@@ -90,7 +91,9 @@ class Rig:
         self.model = Model(system, like=template(mode))
         self.names = {name: k for k, (name, _) in enumerate(self.model.layout.outputs)}
         self._internal = InternalModel.of(Arm(), self.machine, 1.0)
-        self._places, self._hardware, self._rope = self._find_places(), self._measured(), self._find_rope()
+        worn = WornExoskeleton(ecosystem.device, Arm(), ecosystem.misalignment, ecosystem.guide)
+        self._axes = np.ascontiguousarray(worn.axes)
+        self._places, self._hardware, self._rope = self._find_places(), self._measured(worn), self._find_rope()
         self._build()
 
     def _build(self) -> None:
@@ -121,13 +124,11 @@ class Rig:
         calls = [c.element.name for c in self.model.layout.constraints]
         return int(self.model.tables.values.constraints.par_ptr[calls.index(ROPE)])
 
-    def _measured(self) -> Hardware:
+    def _measured(self, worn: WornExoskeleton) -> Hardware:
         """What is the same for all patients."""
-        eco, m = self.ecosystem, self.machine
-        worn, handle = WornExoskeleton(eco.device, Arm(), eco.misalignment, eco.guide), m.handle
-        self._axes = np.ascontiguousarray(worn.axes)
+        m, handle = self.machine, self.machine.handle
         return Hardware(
-            worn.orientation, np.array(eco.device.lower_link.centre_of_mass),
+            worn.orientation, np.array(worn.device.lower_link.centre_of_mass),
             np.array([handle.mass, handle.length, handle.centre_of_mass]), np.array(m.low_pulley),
             np.array(m.high_pulley), m.weight_start,
         )  # fmt: skip
@@ -150,14 +151,15 @@ class Rig:
         """
         if self.world.tables is not self.model.tables:
             self._build()
-        known = self._fit(self._fitting.numbers(patient, load), load)
-        self._set_course(repetition)
-        wanted = self._plan(known.expecting(patient.expected_load * load))
+        numbers, pieces = self._fitting.numbers(patient, load), repetition.signal.pieces()
+        known = self._fit(numbers, load)
+        self._set_course(pieces)
+        wanted = self._plan(known.expecting(patient.expected_load * load), pieces)
         need = Need.of(patient, known, self.ecosystem.device, self.plant.course)
         activations = self._rest(patient, wanted, need, generator)
         held = self.drive.start(self._holding_tension(known, start, activations))
         self._put_inputs(held, activations)
-        self._start(known, start, activations, held)
+        self._start(known, start, activations, held, numbers.start)
         self._tell(patient, load)
         begin(self.packed.table)
         return Episode(self, patient, load, repetition, need)
@@ -167,31 +169,31 @@ class Rig:
         check_reach(self.machine, numbers.elbow, numbers.forearm[5:])
         for mine, given in zip(self.model.numbers, numbers.model, strict=True):
             mine[...] = given
-        self._rest_q, forearm, known = numbers.start, numbers.forearm, self._internal
+        forearm, known = numbers.forearm, self._internal
         arm: ArmTable = known.arm._replace(muscles=numbers.muscles, points=numbers.points, elbow=numbers.elbow)
         carried: LoadTable = known.load._replace(
             inertia=forearm[0], mass=forearm[1], centre_of_mass=forearm[2:5], grip=forearm[5:], weight=load
         )
         return InternalModel(arm, carried)
 
-    def _set_course(self, repetition: Repetition) -> None:
+    def _set_course(self, pieces: Pieces) -> None:
         """The reference as input of the world and as table of the control period."""
-        pieces, signals, plant = repetition.signal.pieces(), self.world.state.signals, self.plant
+        signals, plant = self.world.state.signals, self.plant
         k = self.model.input_index(REFERENCE)
         first, end = signals.ptr[k], signals.ptr[k + 1]
         # A movement without rest between its repetitions has fewer pieces: the last one stands for them.
         each = np.minimum(np.arange(end - first), len(pieces.t) - 1)
         signals.t[first:end], signals.c[first:end] = pieces.t[each], pieces.c[each]
-        self._pieces, last, ahead = pieces, self.times[-1], np.empty((len(self.times), 3))
+        last, ahead = self.times[-1], np.empty((len(self.times), 3))
         course_of(pieces.t, pieces.c, self.times, plant.course)
         for k, t in enumerate(PREVIEW):
             course_of(pieces.t, pieces.c, np.minimum(self.times + t, last), ahead)
             plant.preview[:, k] = ahead[:, 0]
 
-    def _plan(self, known: InternalModel) -> np.ndarray:
+    def _plan(self, known: InternalModel, pieces: Pieces) -> np.ndarray:
         """The patient's command at each control time, shape (n, 6); what rests for long is planned once."""
         times, course = self._planning, np.empty((len(self._planning), 3))
-        course_of(self._pieces.t, self._pieces.c, times, course)
+        course_of(pieces.t, pieces.c, times, course)
         moves = np.flatnonzero(np.abs(course[:, 1]) > STILL)
         kept = np.zeros(len(times), bool)
         for beside in range(-BESIDE, BESIDE + 1):
@@ -233,9 +235,11 @@ class Rig:
         signals.c[plant.inputs, 0] = (*held, *activations)
         plant.commands[:] = held
 
-    def _start(self, known: InternalModel, start: float, activations: np.ndarray, held: np.ndarray) -> None:
-        """The world at its start."""
-        q, v, layout = self._rest_q, np.zeros(self.model.n_q), self.model.layout
+    def _start(
+        self, known: InternalModel, start: float, activations: np.ndarray, held: np.ndarray, q: np.ndarray
+    ) -> None:
+        """The world at its start; q holds what does not move, and takes the rest."""
+        v, layout = np.zeros(self.model.n_q), self.model.layout
         numbers = self.model.tables.values.constraints.par
         numbers[self._rope] = put_start(
             known.arm, known.load, self._hardware, self._places, start, float(self.plant.course[0, 0]), activations, q,

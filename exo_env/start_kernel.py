@@ -12,8 +12,8 @@ import numpy as np
 
 from dms_core.bracket import narrowed, trial
 from dms_core.model.muscles.muscle import fibre_at_rest
-from dms_core.model.rotations import rotated
-from exo_env.command_kernel import cross, dot, path_geometry, triple, turned
+from dms_core.model.rotations import add, cross, dot, rotated, scale, sub, vec
+from exo_env.command_kernel import path_geometry, turned
 from exo_env.jit import compiled
 
 MOST_TRIALS = 200
@@ -72,7 +72,7 @@ def _handle_moment(axis, gravity, to_pulley, handle, weight, angle):
     """Moment about the grip that turns the handle back [Nm]: of the rope and of its own weight."""
     down = turned(axis, math.cos(angle), math.sin(angle), (0.0, -1.0, 0.0))
     length = handle[1]
-    pull = (to_pulley[0] - length * down[0], to_pulley[1] - length * down[1], to_pulley[2] - length * down[2])
+    pull = sub(to_pulley, scale(length, down))
     tension = weight * math.sqrt(dot(gravity, gravity)) / math.sqrt(dot(pull, pull))
     return -(length * tension * dot(axis, cross(down, pull)) + handle[0] * handle[2] * dot(axis, cross(down, gravity)))
 
@@ -115,7 +115,7 @@ def _put_body(q, at, origin, p, centre):
 
 @compiled
 def _distance(a, b):
-    d = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    d = sub(b, a)
     return math.sqrt(dot(d, d))
 
 
@@ -134,20 +134,19 @@ def put_start(arm, load, hardware, places, angle, reference, activations, q, v):
         q: coordinates, of which the constant ones stay.
         v: their rates, 0 but for the controller's.
     """
-    n, elbow, gravity = triple(arm.axis), triple(arm.elbow), triple(load.gravity)
+    n, elbow, gravity = vec(arm.axis, 0), vec(arm.elbow, 0), vec(load.gravity, 0)
     c, s = math.cos(angle), math.sin(angle)
-    r = turned(n, c, s, triple(load.grip))
-    grip = (elbow[0] + r[0], elbow[1] + r[1], elbow[2] + r[2])
-    _put_body(q, places.forearm, elbow, quaternion_of(n, angle), triple(load.centre_of_mass))
+    r = turned(n, c, s, vec(load.grip, 0))
+    grip = add(elbow, r)
+    _put_body(q, places.forearm, elbow, quaternion_of(n, angle), vec(load.centre_of_mass, 0))
     p = hardware.link
     about_hinge = quaternion_of((0.0, 0.0, 1.0), angle)
-    _put_body(q, places.lower, elbow, product((p[0], p[1], p[2], p[3]), about_hinge), triple(hardware.link_centre))
-    low, high = triple(hardware.low_pulley), triple(hardware.high_pulley)
-    to_pulley = (low[0] - grip[0], low[1] - grip[1], low[2] - grip[2])
+    _put_body(q, places.lower, elbow, product((p[0], p[1], p[2], p[3]), about_hinge), vec(hardware.link_centre, 0))
+    low, high = vec(hardware.low_pulley, 0), vec(hardware.high_pulley, 0)
+    to_pulley = sub(low, grip)
     hangs = quaternion_of(n, handle_angle(n, gravity, to_pulley, hardware.handle, load.weight))
     _put_body(q, places.handle, grip, hangs, (0.0, -hardware.handle[2], 0.0))
-    end = rotated(q, places.handle, (0.0, -hardware.handle[1], 0.0))
-    end = (grip[0] + end[0], grip[1] + end[1], grip[2] + end[2])
+    end = add(grip, rotated(q, places.handle, (0.0, -hardware.handle[1], 0.0)))
     weight = (high[0], hardware.weight_height, high[2])
     _put_body(q, places.weight, weight, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     v[places.pid] = reference - angle

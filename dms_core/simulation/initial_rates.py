@@ -173,7 +173,7 @@ def stage_rates(m, s, c0):
         part = BOTH_MATRICES
         clock[C0_FACTORED], clock[CONTRACTION] = c0, 0.0
         count[FACTORISATIONS] += 1
-        count[AGE] = count[STALE] = 0
+        count[AGE] = 0
     _put_state(m, s)
     if not _correct(m, s, part) or not _first_order_change(m, s) < SMALL_CHANGE:
         return False
