@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.assembly.arena import Packed, fields, floats, inner, ints, matrix
-from dms_core.assembly.residual import SIGNALS
 from dms_core.assembly.sensing import read_sensors
+from dms_core.assembly.tables import SIGNALS
 from dms_core.simulation.state import STATE, Options, T
 from dms_core.simulation.step_control import DONE, advance
 from exo_env.effort import SIGN as FLEXION

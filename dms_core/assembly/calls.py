@@ -1,8 +1,8 @@
-"""Calling an element's kernel by its address, from inside compiled code.
+"""Calling functions by their addresses, from inside compiled code.
 
-A kernel is an ordinary `numba.njit` function, so that it can be called, tested and cached like any other. The
-compiled loops know it only by the address of its machine code: one loop, compiled and cached once, serves every
-element that exists or that a user writes later.
+An element's kernel is an ordinary `numba.njit` function, so that it can be called, tested and cached like any other.
+The compiled loops know it only by the address of its machine code (of its entry, see entries.py): one loop, compiled
+and cached once, serves every element that exists or that a user writes later.
 """
 
 from __future__ import annotations
@@ -13,25 +13,20 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-from dms_core.errors import ModelError
-from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
-
-PART = types.void(types.Array(types.int64, 2, "C"), types.Array(types.int64, 2, "C"))
+_TABLE = types.Array(types.int64, 2, "C")
+PART = types.void(_TABLE, _TABLE)
+ENTRY = types.void(_TABLE, types.int64, _TABLE, types.int64)
 SIGNAL = types.void(types.float64, types.Array(types.float64, 1, "C"))
 
 
-def address(kernel: Any, signature: Any, who: str) -> int:
-    """Compile `kernel` for `signature` (or load it from numba's cache) and give the address of its code."""
-    if not hasattr(kernel, "compile"):
-        raise ModelError(f"{who}: its kernel is {kernel!r}; a function decorated with numba.njit is wanted.")
-    return _address(kernel, signature)
-
-
 @cache
-def _address(kernel: Any, signature: Any) -> int:
-    """As above; asking numba again takes longer than a step."""
-    kernel.compile(signature)
-    compiled = kernel.get_compile_result(signature)
+def address(function: Any, signature: Any) -> int:
+    """Compile `function` for `signature` (or load it from numba's cache) and give the address of its code.
+
+    Found once for each function: asking numba again takes longer than a step.
+    """
+    function.compile(signature)
+    compiled = function.get_compile_result(signature)
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
 
@@ -48,21 +43,9 @@ def _call_by_address(signature: Any) -> Any:
 
 
 @intrinsic
-def call_dynamic(typingctx, address, ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """Call a dynamic kernel."""
-    return _call_by_address(DYNAMIC)
-
-
-@intrinsic
-def call_constraint(typingctx, address, ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """Call a constraint kernel."""
-    return _call_by_address(CONSTRAINT)
-
-
-@intrinsic
-def call_sensor(typingctx, address, ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
-    """Call a sensor kernel."""
-    return _call_by_address(SENSOR)
+def call_entry(typingctx, address, calls, e, w, level):
+    """Call the entry of a kernel."""
+    return _call_by_address(ENTRY)
 
 
 @intrinsic

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.assembly.arena import Packed, inner
+from dms_core.assembly.entries import all_calls, moving_calls
 from dms_core.assembly.layout import Layout, same_structure
 from dms_core.assembly.residual import (
     dense_constraints,
@@ -20,7 +21,7 @@ from dms_core.assembly.residual import (
 )
 from dms_core.assembly.sensing import Partials, Sensing, composition, evaluate_partials, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
-from dms_core.assembly.tables import Calls, Signals, Work, all_calls, moving_calls, new_work, signal_tables
+from dms_core.assembly.tables import Calls, Signals, Work, new_work, signal_tables
 from dms_core.assembly.welds import Welds, find_welds, recover
 from dms_core.compilation import announce
 from dms_core.errors import ModelError

@@ -5,8 +5,8 @@ r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi 
 
 import math
 
-from dms_core.assembly.arena import fields, floats, indices, ints, matrix, naturals
-from dms_core.assembly.calls import call_constraint, call_dynamic, call_sensor, call_signal
+from dms_core.assembly.arena import floats, indices, ints, matrix, naturals
+from dms_core.assembly.calls import call_entry, call_signal
 from dms_core.assembly.scatter import (
     begin_newton,
     scatter_constraint,
@@ -14,10 +14,8 @@ from dms_core.assembly.scatter import (
     scatter_dynamic,
     scatter_dynamic_rates,
 )
-from dms_core.assembly.tables import FUNCTION, HARMONIC, Calls, Signals, Work
+from dms_core.assembly.tables import CALLS, FUNCTION, HARMONIC, SIGNALS, WORK
 from dms_core.jit import compiled
-
-CALLS, WORK, SIGNALS = fields(Calls), fields(Work), fields(Signals)
 
 
 @compiled
@@ -85,20 +83,6 @@ def gather_accelerations(calls, e, w):
 
 
 @compiled
-def integers_of(calls, e):
-    """Integers of call e."""
-    ptr = ints(calls, CALLS.ip_ptr)
-    return indices(calls, CALLS.ip)[ptr[e] : ptr[e + 1]]
-
-
-@compiled
-def numbers_of(calls, e):
-    """Numbers of call e."""
-    ptr = ints(calls, CALLS.par_ptr)
-    return floats(calls, CALLS.par)[ptr[e] : ptr[e + 1]]
-
-
-@compiled
 def _clear(block, m, n):
     """block[:m, :n] = 0."""
     for i in range(m):
@@ -119,10 +103,7 @@ def evaluate_dynamic(calls, e, w, level):
         _clear(Jq, n, n)
         _clear(Jv, n, n)
         _clear(Ja, n, n)
-    call_dynamic(
-        ints(calls, CALLS.kernel)[e], integers_of(calls, e), numbers_of(calls, e), floats(w, WORK.q_l),
-        floats(w, WORK.v_l), floats(w, WORK.a_l), matrix(w, WORK.u_l), level, r_l, Jq, Jv, Ja,
-    )  # fmt: skip
+    call_entry(ints(calls, CALLS.kernel)[e], calls, e, w, level)
     return n
 
 
@@ -143,10 +124,7 @@ def evaluate_constraint(calls, e, w, level):
     if level > 0:
         _clear(W, m, n)
         _clear(H, n, n)
-    call_constraint(
-        ints(calls, CALLS.kernel)[e], integers_of(calls, e), numbers_of(calls, e), floats(w, WORK.q_l),
-        floats(w, WORK.v_l), lam_l, matrix(w, WORK.u_l), level, phi_l, phi_t_l, G, W, H,
-    )  # fmt: skip
+    call_entry(ints(calls, CALLS.kernel)[e], calls, e, w, level)
     return n
 
 
@@ -346,8 +324,5 @@ def evaluate_sensor(sensors, e, first, end, w, level):
         _clear(Ya, m, n)
         _clear(Yl, m, Yl.shape[1])
         _clear(Yu, m, Yu.shape[1])
-    call_sensor(
-        ints(sensors, CALLS.kernel)[e], integers_of(sensors, e), numbers_of(sensors, e), floats(w, WORK.q_l),
-        floats(w, WORK.v_l), floats(w, WORK.a_l), lam_l, matrix(w, WORK.u_l), level, y_l, Yq, Yv, Ya, Yl, Yu,
-    )  # fmt: skip
+    call_entry(ints(sensors, CALLS.kernel)[e], sensors, e, w, level)
     return n

@@ -5,10 +5,10 @@ Indices are read as unsigned: that spares the loops numba's test for negative on
 
 from dms_core.assembly.arena import fields, indices, inner, ints, matrix, naturals
 from dms_core.assembly.sparsity import NewtonPattern, Part, RatePattern
-from dms_core.assembly.tables import Work
+from dms_core.assembly.tables import WORK
 from dms_core.jit import compiled
 
-WORK, PART, NEWTON, RATES = fields(Work), fields(Part), fields(NewtonPattern), fields(RatePattern)
+PART, NEWTON, RATES = fields(Part), fields(NewtonPattern), fields(RatePattern)
 
 
 @compiled

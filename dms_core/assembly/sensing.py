@@ -11,17 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.assembly.arena import Packed, fields, floats, indices, inner, ints, matrix
+from dms_core.assembly.entries import integers_of, numbers_of
 from dms_core.assembly.layout import Layout
-from dms_core.assembly.residual import (
-    CALLS,
-    WORK,
-    evaluate_constraint,
-    evaluate_dynamic,
-    evaluate_inputs,
-    evaluate_sensor,
-    integers_of,
-    numbers_of,
-)
+from dms_core.assembly.residual import evaluate_constraint, evaluate_dynamic, evaluate_inputs, evaluate_sensor
+from dms_core.assembly.tables import CALLS, WORK
 from dms_core.jit import compiled
 from dms_core.model.rotations import (
     add,

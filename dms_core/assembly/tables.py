@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dms_core.assembly.arena import fields
 from dms_core.assembly.calls import SIGNAL, address
-from dms_core.assembly.layout import Call, Layout
+from dms_core.assembly.layout import Layout
 from dms_core.errors import InputError
-from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
 from dms_core.model.signals import Function, Harmonic
 
 POLYNOMIAL, HARMONIC, FUNCTION = 0, 1, 2
@@ -19,7 +19,7 @@ class Calls(NamedTuple):
     """Kernel calls of one kind. Slices of the flat arrays belong to call e: x[x_ptr[e] : x_ptr[e + 1]]."""
 
     kernel: np.ndarray
-    """Addresses, (n_calls,)."""
+    """Addresses of their entries (entries.py), (n_calls,)."""
     iq: np.ndarray
     iq_ptr: np.ndarray
     iu: np.ndarray
@@ -92,44 +92,14 @@ class Work(NamedTuple):
     Yu: np.ndarray
 
 
-def _flat(parts: list[Any], dtype: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Concatenate and give the pointers."""
+CALLS, SIGNALS, WORK = fields(Calls), fields(Signals), fields(Work)
+
+
+def flat(parts: list[Any], dtype: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Concatenated parts, and the pointers to where each begins; the last one ends it."""
     arrays = [np.asarray(p, dtype) for p in parts]
     ptr = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
     return np.ascontiguousarray(np.concatenate([np.zeros(0, dtype), *arrays])), ptr
-
-
-def call_tables(calls: list[Call], signature: Any) -> Calls:
-    """Tables of all calls of one kind; kernels are compiled here, or loaded from numba's cache."""
-    kernels = [
-        address(type(c.element).kernel, signature, f"{c.element.kind} '{c.element.name}'")
-        if type(c.element).kernel is not None
-        else 0
-        for c in calls
-    ]
-    return Calls(
-        np.array(kernels, np.int64),
-        *_flat([c.iq for c in calls], np.int32),
-        *_flat([c.iu for c in calls], np.int32),
-        *_flat([c.placement.integers for c in calls], np.int32),
-        *_flat([c.placement.numbers for c in calls], np.float64),
-        np.array([c.row for c in calls] + [sum(c.rows for c in calls)], np.int64),
-        np.arange(len(calls)),
-    )
-
-
-def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:
-    """Tables of dynamics, constraints and sensors; every call counts as moving."""
-    return (
-        call_tables(layout.dynamics, DYNAMIC),
-        call_tables(layout.constraints, CONSTRAINT),
-        call_tables(layout.sensors, SENSOR),
-    )
-
-
-def moving_calls(calls: list[Call], free: np.ndarray) -> np.ndarray:
-    """Numbers of the calls that see a coordinate which is solved for."""
-    return np.array([e for e, c in enumerate(calls) if np.isin(c.iq, free).any()], np.int64)
 
 
 def _writer(function: Any) -> Any:
@@ -158,7 +128,7 @@ def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
             jumps.append(np.array(signal.jumps))
             compiled = _writer(signal.function)
             try:
-                pointer = address(compiled, SIGNAL, f"input '{item.name}'")
+                pointer = address(compiled, SIGNAL)
             except Exception as error:
                 raise InputError(
                     f"input '{item.name}': its function cannot be compiled by numba; it must take t [s] and return "
@@ -173,10 +143,10 @@ def signal_tables(layout: Layout) -> tuple[Signals, list[Any]]:
         starts.append(t)
         coefficients.append(c)
         addresses.append(pointer)
-    flat, ptr = _flat(starts, np.float64)
+    pieces, ptr = flat(starts, np.float64)
     c = np.ascontiguousarray(np.concatenate([np.zeros((0, 6)), *coefficients]))
     events = np.unique(np.concatenate(jumps))
-    return Signals(np.array(kinds, np.int64), flat, c, ptr, np.array(addresses, np.int64), events), keep
+    return Signals(np.array(kinds, np.int64), pieces, c, ptr, np.array(addresses, np.int64), events), keep
 
 
 def with_settings(signals: Signals, settings: dict[int, list[tuple[float, float]]]) -> Signals:
@@ -190,8 +160,9 @@ def with_settings(signals: Signals, settings: dict[int, list[tuple[float, float]
             c[:, 0] = [value for _, value in settings[k]]
         starts.append(t)
         coefficients.append(c)
-    flat, ptr = _flat(starts, np.float64)
-    return signals._replace(t=flat, ptr=ptr, c=np.ascontiguousarray(np.concatenate([np.zeros((0, 6)), *coefficients])))
+    pieces, ptr = flat(starts, np.float64)
+    c = np.ascontiguousarray(np.concatenate([np.zeros((0, 6)), *coefficients]))
+    return signals._replace(t=pieces, ptr=ptr, c=c)
 
 
 def new_work(layout: Layout) -> Work:

@@ -17,8 +17,9 @@ import numpy as np
 
 from dms_core.assembly.arena import fields, floats, indices, inner, matrix
 from dms_core.assembly.layout import Layout
-from dms_core.assembly.residual import WORK, evaluate_residual
+from dms_core.assembly.residual import evaluate_residual
 from dms_core.assembly.sensing import SENSING, put_state
+from dms_core.assembly.tables import WORK
 from dms_core.jit import compiled
 from dms_core.model.constraints.fixed import Fixed
 from dms_core.model.element import GROUND

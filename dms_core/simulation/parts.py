@@ -99,7 +99,7 @@ def part_addresses() -> np.ndarray:
         _inputs, _residual, _constraints, _newton_matrix, _newton_solution, _rate_matrix, _rate_solution,
         _both_matrices,
     )  # fmt: skip
-    return np.array([address(part, PART, part.__name__) for part in parts], np.int64)
+    return np.array([address(part, PART) for part in parts], np.int64)
 
 
 @compiled
