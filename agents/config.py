@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import gymnasium
 from pydantic import Field
@@ -28,6 +28,9 @@ MAPPINGS = ("policy_kwargs", "env_kwargs", "normalize")
 ALIASES = {"ppo_lstm": "recurrent_ppo"}
 """rl_zoo3's name of an algorithm to that of Stable-Baselines3."""
 
+Component = Annotated[float, Field(ge=-1.0, le=1.0)]
+"""Of an action."""
+
 
 class Training(Settings):
     """How a run is watched and kept."""
@@ -44,6 +47,10 @@ class Training(Settings):
     hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held, see hold.py")
     start: tuple[float, float] | None = Field(
         default=None, description="action of PPO's untrained policy, from which it learns to differ; None: 0 and 0"
+    )
+    against: tuple[Component, Component] | None = Field(
+        default=None,
+        description="action whose reward on the same patient is taken off that of training, see paired.py; None: none",
     )
     critic: tuple[str, ...] = Field(
         default=(), description="groups of the observation that only PPO's critic sees, see critic.py"

@@ -210,7 +210,9 @@ def wrapped(config: Config, seed: int) -> VecEnv:
     """
     arguments(config)
     own, more = list(config.env_kwargs.get("observation", ("device",))), config.training.critic
-    worlds = training_worlds(config.env_kwargs | {"observation": [*own, *more]}, config.n_envs, seed)
+    worlds = training_worlds(
+        config.env_kwargs | {"observation": [*own, *more]}, config.n_envs, seed, config.training.against
+    )
     period = config.training.hold * worlds.get_attr("period", 0)[0]
     if config.training.hold > 1:
         worlds = Held(worlds, config.training.hold)
