@@ -22,7 +22,7 @@ from exo_env.control_period import READING, STATUS, Plant, finish, run_period
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import NOTHING, SOLVER, Limits, event
-from exo_env.lift_settings import MOST_STEPS, SMALLEST_STEP, TIME, load_distribution, within, worn_device
+from exo_env.lift_settings import SOLVER_OPTIONS, TIME, load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
 from exo_env.population import Source, population
 from exo_env.readout import Readout
@@ -179,9 +179,7 @@ class ElbowLiftEnv(gymnasium.Env):
         self.ecosystem = Ecosystem(device=worn_device(exoskeleton))
         self.action_mode, self.drive = action_mode, drive(action_mode, dict(drive_settings or {}))
         self.weights, self.limits = Weights(**(reward_weights or {})), Limits(**(limits or {}))
-        self.solver = SolverOptions(
-            rtol=self.drive.rtol if rtol is None else rtol, h_min=SMALLEST_STEP, max_steps=MOST_STEPS, method="sdirk2"
-        )
+        self.solver = SolverOptions(rtol=self.drive.rtol if rtol is None else rtol, **SOLVER_OPTIONS)
         self._weights = self.weights.model_dump()
         self.observer = Observer(observation, noise, self.period)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
