@@ -13,7 +13,8 @@ import numpy as np
 from dms_core.assembly.arena import Packed, fields, floats, indices, inner, ints, matrix
 from dms_core.assembly.entries import integers_of, numbers_of
 from dms_core.assembly.layout import Layout
-from dms_core.assembly.residual import evaluate_constraint, evaluate_dynamic, evaluate_inputs, evaluate_sensor
+from dms_core.assembly.local import evaluate_constraint, evaluate_dynamic, evaluate_sensor, views
+from dms_core.assembly.residual import evaluate_inputs
 from dms_core.assembly.tables import CALLS, WORK
 from dms_core.jit import compiled
 from dms_core.model.rotations import (
@@ -108,7 +109,7 @@ def _constraint_load(calls, e, w, o):
 @compiled
 def reaction(constraints, sensors, e, w, c):
     """Sensor e, reaction of constraint call c: values into y_l."""
-    evaluate_constraint(constraints, c, w, 0)
+    evaluate_constraint(views(constraints, w), constraints, c, w, 0)
     ip, y_l, q_l, r_l = integers_of(sensors, e), floats(w, WORK.y_l), floats(w, WORK.q_l), floats(w, WORK.r_l)
     o, frame = ip[1], ip[2]
     _constraint_load(constraints, c, w, o)
@@ -132,7 +133,7 @@ def _turn_partials(q, frame, row, column, force, moment, into):
 @compiled
 def reaction_partials(constraints, sensors, e, w, c, by_q, by_lam):
     """Derivatives of the reaction by q and lam, scattered into the dense partials."""
-    n = evaluate_constraint(constraints, c, w, 1)
+    n = evaluate_constraint(views(constraints, w), constraints, c, w, 1)
     ip, row = integers_of(sensors, e), ints(sensors, CALLS.row)[e]
     o, frame, s = ip[1], ip[2], vec(numbers_of(sensors, e), 0)
     q, r, G, H = floats(w, WORK.q_l), floats(w, WORK.r_l), matrix(w, WORK.G), matrix(w, WORK.H)
@@ -208,7 +209,7 @@ def joint_moment(dynamics, sensors, e, w, sources):
     )
     total = 0.0
     for s in sources:
-        n = evaluate_dynamic(dynamics, s, w, 0)
+        n = evaluate_dynamic(views(dynamics, w), dynamics, s, w, 0)
         for o in range(0, n - 6, 7):
             if _is_distal(sensors, e, iq[ptr[s] + o]):
                 lever = sub(vec(q_l, o), centre)
@@ -252,7 +253,7 @@ def joint_moment_partials(dynamics, sensors, e, w, sources, by_q, by_v, by_a):
     Jq, Jv, Ja = matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja)
     pull, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for s in sources:
-        n = evaluate_dynamic(dynamics, s, w, 1)
+        n = evaluate_dynamic(views(dynamics, w), dynamics, s, w, 1)
         columns = iq[ptr[s] : ptr[s] + n]
         for o in range(0, n - 6, 7):
             if not _is_distal(sensors, e, columns[o]):
@@ -294,11 +295,11 @@ def _multipliers(constraints, c):
 def evaluate_sensors(dynamics, constraints, sensors, composed, w):
     """All sensors at the state in w, into w.y."""
     kernels, rows, which = ints(sensors, CALLS.kernel), ints(sensors, CALLS.row), ints(composed, COMPOSITION.constraint)
-    y, y_l = floats(w, WORK.y), floats(w, WORK.y_l)
+    y, y_l, x = floats(w, WORK.y), floats(w, WORK.y_l), views(sensors, w)
     for e in range(kernels.shape[0]):
         if kernels[e] != 0:
             first, end = _multipliers(constraints, which[e])
-            evaluate_sensor(sensors, e, first, end, w, 0)
+            evaluate_sensor(x, sensors, e, first, end, w, 0)
         elif integers_of(sensors, e)[0] == REACTION:
             reaction(constraints, sensors, e, w, which[e])
         else:
@@ -314,7 +315,7 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
     by_q, by_v, by_a = matrix(into, PARTIALS.q), matrix(into, PARTIALS.v), matrix(into, PARTIALS.a)
     by_lam, by_u = matrix(into, PARTIALS.lam), matrix(into, PARTIALS.u)
     Yq, Yv, Ya = matrix(w, WORK.Yq), matrix(w, WORK.Yv), matrix(w, WORK.Ya)
-    Yl, Yu = matrix(w, WORK.Yl), matrix(w, WORK.Yu)
+    Yl, Yu, x = matrix(w, WORK.Yl), matrix(w, WORK.Yu), views(sensors, w)
     iq, ptr, iu, u_ptr = (
         indices(sensors, CALLS.iq), ints(sensors, CALLS.iq_ptr), indices(sensors, CALLS.iu),
         ints(sensors, CALLS.iu_ptr),
@@ -327,7 +328,7 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
                 joint_moment_partials(dynamics, sensors, e, w, _sources(composed, e), by_q, by_v, by_a)
             continue
         first, end = _multipliers(constraints, which[e])
-        n = evaluate_sensor(sensors, e, first, end, w, 1)
+        n = evaluate_sensor(x, sensors, e, first, end, w, 1)
         for i in range(rows[e + 1] - rows[e]):
             row = rows[e] + i
             for j in range(n):
