@@ -10,7 +10,7 @@ from typing import Any
 import tyro
 from tqdm import tqdm
 
-from dms_core.errors import DmsError
+from dms_core.errors import DmsError, InputError
 
 USER_MISTAKE, FAILED_RUN = 2, 1
 """Exit statuses."""
@@ -38,6 +38,7 @@ def run_command(
 ) -> int:
     """Run one of the commands; a mistake of the user is one message on stderr and status 2."""
     try:
+        _check_options(sys.argv[1:] if arguments is None else arguments)
         status = tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=description, args=arguments)
         sys.stdout.flush()
         return status
@@ -48,3 +49,11 @@ def run_command(
         # The reader (head, less) has seen enough; what is left to flush at exit must not complain either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _check_options(arguments: list[str]) -> None:
+    """Refuses an option that stands twice, of which only the last one would count."""
+    options = [a.partition("=")[0] for a in arguments if a.startswith("--")]
+    for option in options:
+        if options.count(option) > 1:
+            raise InputError(f"{option} stands {options.count(option)} times; write it once, with all its values behind.")

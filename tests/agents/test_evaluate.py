@@ -94,6 +94,7 @@ def test_shares_of_work_sum_to_one_and_measures_are_complete():
         (["--policy", "none", "--population", "martians"], "unknown population 'martians'"),
         (["--policy", "none", "--patients", "0"], "patients = 0"),
         (["--policy", "none", "--seed", "-1"], "seed = -1"),
+        (["--policy", "none", "--policy", "pid"], "--policy stands 2 times"),
     ],
 )
 def test_mistakes_are_one_message(arguments, said, tmp_path, capsys):
