@@ -18,12 +18,19 @@ TRIES = "baselines_tries.csv"
 
 
 def tune_baselines(
-    tries: int = 48, patients: int = 30, seed: int = 0, repetitions: int = 1, workers: int = 1, out: Path | None = None
+    tries: int = 48,
+    population: str = POPULATION,
+    patients: int = 30,
+    seed: int = 0,
+    repetitions: int = 1,
+    workers: int = 1,
+    out: Path | None = None,
 ) -> int:
     """Search the baselines' numbers for the best mean return on the training population.
 
     Args:
         tries: of each policy, half of them spread over its ranges and half around the best.
+        population: to train on, by name or YAML file.
         patients: episodes of each try.
         seed: of the patients and of the search.
         repetitions: of the movement in an episode.
@@ -33,6 +40,7 @@ def tune_baselines(
     folder = (configs() / FILE).parent if out is None else out
     check_writable(folder / TRIES)
     command = f"python -m agents tune-baselines --tries {tries} --patients {patients} --seed {seed}"
+    command += f" --population {population}" if population != POPULATION else ""
     command += f" --repetitions {repetitions}" if repetitions > 1 else ""
     found: dict[str, list[Try]] = {}
     with tqdm(total=len(tunable()) * tries, unit="try", leave=False, disable=None, file=sys.stderr) as bar:
@@ -42,9 +50,13 @@ def tune_baselines(
             bar.update()
 
         for name in tunable():
-            found[name] = tune(name, tries, patients, seed, workers=workers, progress=progress, repetitions=repetitions)
-    for path, text in ((folder / Path(FILE).name, _yaml(found, command)), (folder / TRIES, _table(found, command))):
-        with whole_file(path) as file:
+            found[name] = tune(
+                name, tries, patients, seed, population=population, workers=workers, progress=progress,
+                repetitions=repetitions,
+            )  # fmt: skip
+    texts = {Path(FILE).name: _yaml(found, population, command), TRIES: _table(found, command)}
+    for name, text in texts.items():
+        with whole_file(folder / name) as file:
             file.write(text)
     for name, ranked in found.items():
         best = ranked[0]
@@ -53,10 +65,10 @@ def tune_baselines(
     return 0
 
 
-def _yaml(found: dict[str, list[Try]], command: str) -> str:
+def _yaml(found: dict[str, list[Try]], population: str, command: str) -> str:
     """Best numbers of each policy, with where they are from."""
     lines = [
-        f"# Numbers of the baselines with the best mean return on '{POPULATION}', found by",
+        f"# Numbers of the baselines with the best mean return on '{population}', found by",
         f"#   {command}",
         f"# All tries stand in {TRIES}.",
     ]

@@ -22,7 +22,7 @@ from agents.tuned import Range
 from dms_core.errors import InputError
 
 POPULATION, STREAM = "mixed", 2**32
-"""Training population; added to a seed, so that the patients are not those of an evaluation with it."""
+"""Training population by default; added to a seed, so that the patients are not those of an evaluation with it."""
 SPREAD = 0.1
 """Standard deviation around the best, as a share of each range."""
 BATCH = 8
@@ -44,10 +44,10 @@ def tunable() -> dict[str, dict[str, Range]]:
     return {name: kind.ranges for name, kind in POLICIES.items() if kind.ranges}
 
 
-def trial(policy: str, numbers: dict[str, float], seeds: list[int], settings: dict[str, Any]) -> Try:
+def trial(policy: str, numbers: dict[str, float], population: str, seeds: list[int], settings: dict[str, Any]) -> Try:
     """Means over the episodes of some seeds."""
     acting = POLICIES[policy](**numbers)
-    env = world_of(acting, POPULATION, **settings)
+    env = world_of(acting, population, **settings)
     found = [episode(env, acting, seed)["measures"] for seed in seeds]
     env.close()
     return Try(policy, numbers, {m: float(np.nanmean([f[m] for f in found])) for m in MEASURED})
@@ -59,6 +59,7 @@ def tune(
     patients: int,
     seed: int,
     *,
+    population: str = POPULATION,
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
     **settings: Any,
@@ -70,6 +71,7 @@ def tune(
         tries: how many.
         patients: episodes of each.
         seed: of the patients and of the search.
+        population: of the patients, by name or YAML file.
         workers: processes.
         progress: called with the name of the policy after each try.
         settings: further ones of the environment.
@@ -94,7 +96,7 @@ def tune(
     def run(places: np.ndarray, pool: ProcessPoolExecutor) -> None:
         """Try these places, each from 0 to 1 in every range."""
         rows = [{n: r.at(x) for (n, r), x in zip(ranges.items(), place, strict=True)} for place in places]
-        tried = pool.map(trial, repeat(policy), rows, repeat(seeds), repeat(settings))
+        tried = pool.map(trial, repeat(policy), rows, repeat(population), repeat(seeds), repeat(settings))
         for place, one in zip(places, tried, strict=True):
             found.append((place, one))
             if progress is not None:

@@ -55,5 +55,6 @@ def _check_options(arguments: list[str]) -> None:
     """Refuses an option that stands twice, of which only the last one would count."""
     options = [a.partition("=")[0] for a in arguments if a.startswith("--")]
     for option in options:
-        if options.count(option) > 1:
-            raise InputError(f"{option} stands {options.count(option)} times; write it once, with all its values behind.")
+        count = options.count(option)
+        if count > 1:
+            raise InputError(f"{option} stands {count} times; write it once, with all its values behind.")

@@ -11,7 +11,7 @@ from agents.assist_as_needed import AssistAsNeeded
 from agents.baselines import POLICIES, policy
 from agents.evaluate import patient_seeds
 from agents.tuned import Range, numbers
-from agents.tuning import STREAM, trial, tunable, tune
+from agents.tuning import POPULATION, STREAM, trial, tunable, tune
 from agents.yielding import YieldingPid
 from dms_core.config_files import configs
 from dms_core.errors import InputError
@@ -62,7 +62,7 @@ def test_search_is_repeatable_and_ranked():
     returns = [one.measures["return"] for one in found]
     assert returns == sorted(returns, reverse=True) and returns[0] > returns[-1]
     # A try can be had again by its numbers.
-    assert trial("pid_yielding", found[0].numbers, patient_seeds(STREAM + 3, 1), SHORT) == found[0]
+    assert trial("pid_yielding", found[0].numbers, POPULATION, patient_seeds(STREAM + 3, 1), SHORT) == found[0]
 
 
 def test_patients_of_the_search_are_not_those_of_an_evaluation():
