@@ -53,7 +53,8 @@ def run_command(
 
 def _check_options(arguments: list[str]) -> None:
     """Refuses an option that stands twice, of which only the last one would count."""
-    options = [a.partition("=")[0] for a in arguments if a.startswith("--")]
+    given = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    options = [a.partition("=")[0].replace("_", "-") for a in given if a.startswith("--")]
     for option in options:
         count = options.count(option)
         if count > 1:

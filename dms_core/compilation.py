@@ -19,14 +19,18 @@ PACKAGE = Path(__file__).parent
 STAMP = "compiled_sources.sha256"
 
 
+LAYOUT = ("assembly", "jit.py")
+"""Sources that say where compiled code finds its arrays, whether they hold compiled functions or not."""
+
+
 def fingerprint(package: Path = PACKAGE) -> str:
-    """Hash of every source file that holds compiled functions, of this package and of one built on it."""
+    """Hash of every source file that shapes compiled functions, of this package and of one built on it."""
     digest = hashlib.sha256()
     for folder in dict.fromkeys((PACKAGE, package)):
         for path in sorted(folder.rglob("*.py")):
-            text = path.read_bytes()
-            if b"@compiled" in text:
-                digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + text)
+            text, place = path.read_bytes(), path.relative_to(folder)
+            if b"@compiled" in text or place.parts[0] in LAYOUT:
+                digest.update(place.as_posix().encode() + b"\0" + text)
     return digest.hexdigest()
 
 

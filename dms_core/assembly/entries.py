@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import is_jitted
 
 from dms_core.assembly.arena import floats, indices, ints, matrix
 from dms_core.assembly.calls import ENTRY, address
 from dms_core.assembly.layout import Call, Layout
 from dms_core.assembly.tables import CALLS, WORK, Calls, flat
+from dms_core.compilation import fingerprint
 from dms_core.errors import ModelError
 from dms_core.jit import compiled
 from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
@@ -66,22 +68,31 @@ _ENTRIES = {DYNAMIC: _dynamic, CONSTRAINT: _constraint, SENSOR: _sensor}
 
 
 @cache
+def _state_of_package() -> str:
+    return fingerprint()[:12]
+
+
+@cache
 def entry(kernel: Any, signature: Any) -> Any:
     """The function (calls, e, w, level) that runs `kernel` on the local arrays of call e.
 
-    It counts as a function of the kernel's file, where numba keeps its machine code if it keeps the kernel's, and
-    forgets it when that file changes.
+    It counts as a function of the kernel's file, where numba keeps its machine code if it keeps the kernel's; the
+    places of the arrays are part of that code, so the state of this package is part of the name. What a kernel takes
+    from a function around it numba would not see, so such an entry is not kept.
     """
     function, form = kernel.py_func, _ENTRIES[signature]
-    name, origin = f"{function.__name__}_entry", function.__code__
+    name, origin = f"{function.__name__}_entry_{_state_of_package()}", function.__code__
     code = form.__code__.replace(
         co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
     )
     habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
-    known = {**form.__globals__, "_kernel": njit(function, forceinline=True, **habits)}
+    options = {k: v for k, v in kernel.targetoptions.items() if k not in ("nopython", "cache")}
+    within = njit(function, locals=kernel.locals, **{**options, **habits, "forceinline": True})
+    known = {**form.__globals__, "_kernel": within}
     found = FunctionType(code, known, name)
     found.__module__, found.__qualname__ = function.__module__, name
-    return njit(found, cache=kernel.stats.cache_path is not None, **habits)
+    kept = kernel.stats.cache_path is not None and function.__closure__ is None
+    return njit(found, cache=kept, **habits)
 
 
 def call_tables(calls: list[Call], signature: Any) -> Calls:
@@ -94,7 +105,7 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
     for call in calls:
         element = call.element
         kernel: Any = type(element).kernel
-        if kernel is not None and not hasattr(kernel, "py_func"):
+        if kernel is not None and not is_jitted(kernel):
             raise ModelError(
                 f"{element.kind} '{element.name}': its kernel is {kernel!r}; a function decorated with numba.njit is "
                 "wanted."

@@ -38,7 +38,11 @@ def test_a_reward_is_that_of_the_world_less_that_of_its_twin():
     np.testing.assert_array_equal(first, begun[:WORLDS])
     given = np.repeat([action, against], WORLDS, axis=0)
     for _ in range(STEPS):
-        seen, rewards, _, _ = worlds.step(np.tile(action, (WORLDS, 1)))
+        seen, rewards, over, _ = worlds.step(np.tile(action, (WORLDS, 1)))
+        if over.any():
+            own, twins = worlds.get_attr("episode"), worlds.unwrapped.get_attr("episode", range(WORLDS, 2 * WORLDS))
+            for mine, theirs in zip(own, twins, strict=True):
+                assert (mine.patient, mine.load, mine.repetition) == (theirs.patient, theirs.load, theirs.repetition)
         there, parts, *_ = alone.step(given)
         np.testing.assert_array_equal(seen, there[:WORLDS])
         single = parts.astype(np.float32)
@@ -72,8 +76,8 @@ def test_a_pair_that_fell_out_of_step_begins_together_again(dropped):
             assert rewards[0] == np.float32(alone)
         times.append(count)
     assert max(times) < 50 if dropped == "world" else times == [100, 100]
-    twin = worlds.get_attr("episode")[1]
-    own = worlds.get_attr("episode")[0]
+    (own,) = worlds.get_attr("episode")
+    twin = worlds.unwrapped.get_attr("episode", 1)[0]
     assert own.patient == twin.patient and own.load == twin.load and own.repetition == twin.repetition
     assert seen.shape == (1, worlds.observation_space.shape[0])
     worlds.close()

@@ -60,3 +60,50 @@ def test_a_force_of_the_user_is_as_fast_as_a_built_in_one(cubic_spring):
     built_in = cost(lambda i: SpringDamper(name=f"s{i}", body_j=f"m{i}", stiffness=1.0, free_length=0.1))
     # A Python call per evaluation would cost a hundred times as much; the ratio is about 1 on a quiet machine.
     assert own < 5.0 * built_in
+
+
+FACTORY = '''
+from typing import ClassVar
+from numba import njit
+from dms_core.model.element import Force, Placement
+
+
+def pull(stiffness):
+    @njit(cache=True)
+    def kernel(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
+        r[0] += stiffness * q[0]
+        if level > 0:
+            Jq[0, 0] += stiffness
+
+    return kernel
+
+
+class Pull(Force):
+    body: str
+
+    def place(self, system):
+        return Placement(bodies=(self.body,))
+
+
+class Soft(Pull):
+    kind: ClassVar[str] = "soft"
+    kernel: ClassVar = pull(1.0)
+
+
+class Stiff(Pull):
+    kind: ClassVar[str] = "stiff"
+    kernel: ClassVar = pull(4.0)
+'''
+
+
+def test_kernels_of_one_factory_are_not_taken_for_each_other(tmp_path, monkeypatch):
+    (tmp_path / "user_factory.py").write_text(FACTORY)
+    monkeypatch.syspath_prepend(tmp_path)
+    import user_factory
+
+    bodies = [PointMass(name=name, mass=1.0, position=(1.0, 0.0, 0.0)) for name in ("a", "b")]
+    forces = [user_factory.Soft(name="soft", body="a"), user_factory.Stiff(name="stiff", body="b")]
+    states = simulate(System("two", bodies=bodies, forces=forces), 1.0, SolverOptions(rtol=1e-7)).check().at(1.0)
+    # cos(sqrt(k) t); the tolerance is some hundred times rtol.
+    assert states.coordinate("a.x") == pytest.approx(np.cos(1.0), abs=1e-5)
+    assert states.coordinate("b.x") == pytest.approx(np.cos(2.0), abs=1e-5)
