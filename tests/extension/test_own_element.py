@@ -62,7 +62,7 @@ def test_a_force_of_the_user_is_as_fast_as_a_built_in_one(cubic_spring):
     assert own < 5.0 * built_in
 
 
-FACTORY = '''
+FACTORY = """
 from typing import ClassVar
 from numba import njit
 from dms_core.model.element import Force, Placement
@@ -93,7 +93,7 @@ class Soft(Pull):
 class Stiff(Pull):
     kind: ClassVar[str] = "stiff"
     kernel: ClassVar = pull(4.0)
-'''
+"""
 
 
 def test_kernels_of_one_factory_are_not_taken_for_each_other(tmp_path, monkeypatch):
