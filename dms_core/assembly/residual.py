@@ -5,7 +5,7 @@ r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi 
 
 import math
 
-from dms_core.assembly.arena import floats, indices, ints, matrix
+from dms_core.assembly.arena import floats, ints, matrix
 from dms_core.assembly.calls import call_signal
 from dms_core.assembly.local import (
     add_constraint_forces,
@@ -159,30 +159,28 @@ def dense_constraints(constraints, w, G, W):
     """phi, phi_v and dense phi_q, (phi_q v)_q, shapes (n_phi, n_q + 7)."""
     G[:, :] = 0.0
     W[:, :] = 0.0
-    G_l, W_l, iq = matrix(w, WORK.G), matrix(w, WORK.W), indices(constraints, CALLS.iq)
-    ptr, rows = ints(constraints, CALLS.iq_ptr), ints(constraints, CALLS.row)
     x = views(constraints, w)
     for e in range(x.kernel.shape[0]):
         n = evaluate_constraint(x, constraints, e, w, 1)
         put_constraint_values(x, e, n)
-        for k in range(rows[e + 1] - rows[e]):
+        row, start = x.row[e], x.iq_ptr[e]
+        for k in range(x.row[e + 1] - row):
             for i in range(n):
-                G[rows[e] + k, iq[ptr[e] + i]] += G_l[k, i]
-                W[rows[e] + k, iq[ptr[e] + i]] += W_l[k, i]
+                G[row + k, x.iq[start + i]] += x.G[k, i]
+                W[row + k, x.iq[start + i]] += x.W[k, i]
 
 
 @compiled
 def dense_jacobians(constraints, w, q, G):
     """phi_q at each of the positions q, shapes (k, n_q) and (k, n_phi, n_q + 7)."""
     G[:, :, :] = 0.0
-    G_l, q_w, iq = matrix(w, WORK.G), floats(w, WORK.q), indices(constraints, CALLS.iq)
-    ptr, rows = ints(constraints, CALLS.iq_ptr), ints(constraints, CALLS.row)
     x = views(constraints, w)
     for k in range(q.shape[0]):
         for i in range(q.shape[1]):
-            q_w[i] = q[k, i]
+            x.q[i] = q[k, i]
         for e in range(x.kernel.shape[0]):
             n = evaluate_constraint(x, constraints, e, w, 0)
-            for m in range(rows[e + 1] - rows[e]):
+            row, start = x.row[e], x.iq_ptr[e]
+            for m in range(x.row[e + 1] - row):
                 for i in range(n):
-                    G[k, rows[e] + m, iq[ptr[e] + i]] += G_l[m, i]
+                    G[k, row + m, x.iq[start + i]] += x.G[m, i]

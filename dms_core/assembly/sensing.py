@@ -201,19 +201,13 @@ def _joint(sensors, e, w):
 def joint_moment(dynamics, sensors, e, w, sources):
     """Sensor e, moment of the dynamic calls in `sources`: value into y_l[0]."""
     axis, centre = _joint(sensors, e, w)
-    q_l, r_l, iq, ptr = (
-        floats(w, WORK.q_l),
-        floats(w, WORK.r_l),
-        indices(dynamics, CALLS.iq),
-        ints(dynamics, CALLS.iq_ptr),
-    )
-    total = 0.0
+    x, total = views(dynamics, w), 0.0
     for s in sources:
-        n = evaluate_dynamic(views(dynamics, w), dynamics, s, w, 0)
+        n = evaluate_dynamic(x, dynamics, s, w, 0)
         for o in range(0, n - 6, 7):
-            if _is_distal(sensors, e, iq[ptr[s] + o]):
-                lever = sub(vec(q_l, o), centre)
-                total -= dot(axis, add(cross(lever, vec(r_l, o)), ground_moment(q_l, o, r_l, o + 3)))
+            if _is_distal(sensors, e, x.iq[x.iq_ptr[s] + o]):
+                lever = sub(vec(x.q_l, o), centre)
+                total -= dot(axis, add(cross(lever, vec(x.r_l, o)), ground_moment(x.q_l, o, x.r_l, o + 3)))
     floats(w, WORK.y_l)[0] = total
 
 
@@ -244,34 +238,28 @@ def joint_moment_partials(dynamics, sensors, e, w, sources, by_q, by_v, by_a):
     """Derivatives of the moment by q, v and vdot, scattered into the dense partials."""
     row, par = ints(sensors, CALLS.row)[e], numbers_of(sensors, e)
     axis, centre = _joint(sensors, e, w)
-    q_l, r_l, iq, ptr = (
-        floats(w, WORK.q_l),
-        floats(w, WORK.r_l),
-        indices(dynamics, CALLS.iq),
-        ints(dynamics, CALLS.iq_ptr),
-    )
-    Jq, Jv, Ja = matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja)
+    x, Jq, Jv, Ja = views(dynamics, w), matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja)
     pull, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for s in sources:
-        n = evaluate_dynamic(views(dynamics, w), dynamics, s, w, 1)
-        columns = iq[ptr[s] : ptr[s] + n]
+        n = evaluate_dynamic(x, dynamics, s, w, 1)
+        columns = x.iq[x.iq_ptr[s] : x.iq_ptr[s] + n]
         for o in range(0, n - 6, 7):
             if not _is_distal(sensors, e, columns[o]):
                 continue
-            lever, force = sub(vec(q_l, o), centre), scale(-1.0, vec(r_l, o))
+            lever, force = sub(vec(x.q_l, o), centre), scale(-1.0, vec(x.r_l, o))
             pull = add(pull, force)
-            turn = add(turn, sub(cross(lever, force), ground_moment(q_l, o, r_l, o + 3)))
+            turn = add(turn, sub(cross(lever, force), ground_moment(x.q_l, o, x.r_l, o + 3)))
             _own_partials(w, o, columns, axis, force, row, by_q)
             for j in range(n):
-                by_q[row, columns[j]] -= _moment_of_column(Jq, j, o, q_l, lever, axis)
-                by_v[row, columns[j]] -= _moment_of_column(Jv, j, o, q_l, lever, axis)
-                by_a[row, columns[j]] -= _moment_of_column(Ja, j, o, q_l, lever, axis)
+                by_q[row, columns[j]] -= _moment_of_column(Jq, j, o, x.q_l, lever, axis)
+                by_v[row, columns[j]] -= _moment_of_column(Jv, j, o, x.q_l, lever, axis)
+                by_a[row, columns[j]] -= _moment_of_column(Ja, j, o, x.q_l, lever, axis)
     _joint(sensors, e, w)
     about, Yq = cross(pull, axis), matrix(w, WORK.G)
     for j in range(7):
         Yq[0, j] = -about[j] if j < 3 else 0.0
-    add_gradient(Yq, 0, 0, q_l, turn, vec(par, 3), 1.0)
-    add_gradient(Yq, 0, 0, q_l, about, vec(par, 0), -1.0)
+    add_gradient(Yq, 0, 0, x.q_l, turn, vec(par, 3), 1.0)
+    add_gradient(Yq, 0, 0, x.q_l, about, vec(par, 0), -1.0)
     iq, start = indices(sensors, CALLS.iq), ints(sensors, CALLS.iq_ptr)[e]
     for j in range(7):
         by_q[row, iq[start + j]] += Yq[0, j]

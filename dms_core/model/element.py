@@ -1,7 +1,7 @@
 """The contract between an element and the system: what is declared, what is placed, what a kernel computes.
 
 An element is two things in one file: a frozen declaration (its class: names, numbers, units) and a compiled
-kernel (a function of small local arrays). The system gathers the local coordinates, calls the kernel by address,
+kernel (a function of small local arrays). The system gathers the local coordinates, runs the kernel,
 and scatters what it wrote; the element never learns where its numbers go.
 
 Local coordinates: seven per body named in `Placement.bodies` (position of the centre of mass, Euler parameters;

@@ -93,6 +93,26 @@ def test_command_writes_what_the_policies_read(tmp_path, capsys, monkeypatch):
     assert lines[0].startswith("# python -m agents tune-baselines --tries 2") and len(lines) == 2 + 2 * len(tunable())
 
 
+def test_command_tunes_on_the_population_that_is_named(tmp_path, monkeypatch):
+    asked = []
+
+    def seen(*given, **more):
+        asked.append(more["population"])
+        return tune(*given, **more, **SHORT)
+
+    monkeypatch.setattr("agents.tune_command.tune", seen)
+    command = ["tune-baselines", "--tries", "2", "--patients", "1", "--population", "wide", "--out", str(tmp_path)]
+    assert main(command) == 0
+    assert asked == ["wide"] * len(tunable())
+    head = (tmp_path / "baselines.yml").read_text()
+    assert "best mean return on 'wide'" in head and "--population wide" in head
+
+
+def test_an_unknown_population_is_named():
+    with pytest.raises(InputError, match="unknown population 'martians'"):
+        tune("pid_yielding", 2, 1, 0, population="martians")
+
+
 def test_yielding_pid_acts_as_its_numbers_say():
     import gymnasium
 
