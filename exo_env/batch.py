@@ -10,6 +10,7 @@ import numpy as np
 
 from dms_core.assembly.arena import Packed, floats, ints, table_at
 from dms_core.simulation.step_control import DONE
+from exo_env.claims import AREAS, areas_of, claim, fetch_ahead
 from exo_env.control_period import PLANT, READING, STATUS, run_period
 from exo_env.effort import STATE as EFFORT
 from exo_env.jit import compiled
@@ -18,8 +19,8 @@ from exo_env.rewards import TERMS
 FIELDS, N_TERMS = len(PLANT), len(TERMS)
 NUMBERS = ("reward", *TERMS, "time", "tracking_error", "device_share", "effort", "elbow_reaction")
 """What is collected of each world, in the order of `Batch.numbers`; time in control periods, error in rad."""
-CHUNKS = 4
-"""Pieces of work a thread, so that none waits long for the slowest world."""
+BESIDE = ("noise", "wanted", "course", "preview", "lacking", "newton", "newton_lu", "rates", "rate_lu")
+"""Fields not fetched ahead: of what goes over an episode a period reads one row, and worlds share their patterns."""
 
 
 @compiled
@@ -44,15 +45,23 @@ def collect(p, observation, numbers, status):
 
 
 @compiled(nogil=True)
-def run_some(addresses, which, actions, observations, numbers, status, first, last):
-    """A control period of the worlds which[first:last]; where the solver gives up, `status` holds its code."""
-    for k in range(first, last):
+def run_some(addresses, areas, which, actions, observations, numbers, status, done, ahead):
+    """A control period of worlds which[k] that no other thread has taken, until all are done.
+
+    `done` counts those that are taken; the world `ahead` of them is fetched. Where the solver gives up, `status` holds
+    its code.
+    """
+    k = claim(done)
+    while k < which.shape[0]:
+        if k + ahead < which.shape[0]:
+            fetch_ahead(areas[which[k + ahead]])
         i = which[k]
         p = table_at(addresses[i], FIELDS)
         if run_period(p, actions[i]) == DONE:
             collect(p, observations[i], numbers[i], status[i])
         else:
             status[i, STATUS.code] = ints(p, PLANT.status)[STATUS.code]
+        k = claim(done)
 
 
 class Batch:
@@ -71,16 +80,19 @@ class Batch:
 
     def __init__(self, size: int, observed: int, threads: int | None = None) -> None:
         self.threads = min(size, threads or _cores())
-        self._addresses = np.zeros(size, np.int64)
+        self._addresses, self._areas = np.zeros(size, np.int64), np.zeros((size, AREAS, 2), np.int64)
         # Compiled code knows addresses only: what they point to is kept here.
         self.worlds: list[Packed | None] = [None] * size
         self.observations = np.zeros((size, observed), np.float32)
         self.numbers = np.zeros((size, len(NUMBERS)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        # The thread that calls works, too.
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
     def put(self, i: int, world: Packed) -> None:
         """World i is that of a packed Plant."""
+        if self.worlds[i] is not world:
+            self._areas[i] = areas_of(world, BESIDE)
         self.worlds[i], self._addresses[i] = world, world.table.ctypes.data
         collect(world.table, self.observations[i], self.numbers[i], self.status[i])
 
@@ -90,18 +102,19 @@ class Batch:
         Returns:
             Those whose solver gave up.
         """
-        share = partial(run_some, self._addresses, which, actions, self.observations, self.numbers, self.status)
-        if self._pool is None or len(which) == 1:
-            share(0, len(which))
-        else:
-            edges = np.linspace(0, len(which), min(CHUNKS * self.threads, len(which)) + 1).astype(int).tolist()
-            jobs = [self._pool.submit(share, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-            try:
-                for job in jobs:
-                    job.result()
-            finally:
-                # An interrupt must not leave threads behind that still write.
-                wait(jobs)
+        helpers = min(self.threads, len(which)) - 1
+        share = partial(
+            run_some, self._addresses, self._areas, which, actions, self.observations, self.numbers, self.status,
+            np.zeros(1, np.int64), helpers + 1,
+        )  # fmt: skip
+        jobs = [self._pool.submit(share) for _ in range(helpers)] if self._pool else []
+        try:
+            share()
+        finally:
+            # An interrupt must not leave threads behind that still write.
+            wait(jobs)
+        for job in jobs:
+            job.result()
         return which[self.status[which, STATUS.code] != DONE]
 
     def close(self) -> None:
