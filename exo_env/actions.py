@@ -28,7 +28,18 @@ COMMANDS = (f"{AGONIST}_command", f"{ANTAGONIST}_command")
 SETPOINT, FILTER = "setpoint", "setpoint_filter"
 
 
-class RopeTension(Settings):
+class _Drive(Settings):
+    def start(self, holding_tension: float) -> np.ndarray:
+        """Values of the inputs at the start, where `holding_tension` [N] of the agonist would hold the arm."""
+        always, most = self.holding()
+        return always + np.clip(holding_tension, 0.0, most)
+
+    def holding(self) -> np.ndarray:
+        """What each input is at the start, and how much of the holding tension it takes at most, shape (2, 2)."""
+        raise NotImplementedError
+
+
+class RopeTension(_Drive):
     """Drive of action mode 'rope_tension'."""
 
     names: ClassVar[tuple[str, str]] = ("agonist tension", "antagonist tension")
@@ -56,9 +67,9 @@ class RopeTension(Settings):
         """Largest tension of a motor [N]."""
         return max(self.max_tension)
 
-    def start(self, holding_tension: float) -> np.ndarray:
-        """Values of the inputs at the start: the arm is held by the agonist."""
-        return np.array([min(max(holding_tension, 0.0), self.max_tension[0]), 0.0])
+    def holding(self) -> np.ndarray:
+        """The arm is held by the agonist."""
+        return np.array([[0.0, 0.0], [self.max_tension[0], 0.0]])
 
     def table(self, period: float) -> np.ndarray:
         """Offset and gain from an action to a command [N], and its largest change in a period [N], shape (2, 3)."""
@@ -83,7 +94,7 @@ class RopeTension(Settings):
         )
 
 
-class PidSetpoint(Settings):
+class PidSetpoint(_Drive):
     """Drive of action mode 'pid_setpoint'."""
 
     names: ClassVar[tuple[str, str]] = ("setpoint change", "authority")
@@ -100,9 +111,9 @@ class PidSetpoint(Settings):
         """Largest tension of a motor [N]."""
         return worn.device.actuator.max_tension
 
-    def start(self, holding_tension: float) -> np.ndarray:
-        """Values of the inputs at the start: no change, and half of the authority, as for an action of zeros."""
-        return np.array([0.0, 0.5])
+    def holding(self) -> np.ndarray:
+        """No change, and half of the authority, as for an action of zeros."""
+        return np.array([[0.0, 0.5], [0.0, 0.0]])
 
     def table(self, period: float) -> np.ndarray:
         """Offset and gain to setpoint change [rad] and authority [-], largest change in a period, shape (2, 3)."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +16,10 @@ from exo_env.claims import AREAS, areas_of, claim, fetch_ahead
 from exo_env.control_period import PLANT, READING, STATUS, run_period
 from exo_env.effort import STATE as EFFORT
 from exo_env.jit import compiled
+from exo_env.opening import OPEN, SETTING, open_episode
 from exo_env.rewards import TERMS
 
-FIELDS, N_TERMS = len(PLANT), len(TERMS)
+FIELDS, SETTING_FIELDS, N_TERMS = len(PLANT), len(SETTING), len(TERMS)
 NUMBERS = ("reward", *TERMS, "time", "tracking_error", "device_share", "effort", "elbow_reaction")
 """What is collected of each world, in the order of `Batch.numbers`; time in control periods, error in rad."""
 BESIDE = ("noise", "wanted", "course", "preview", "lacking", "newton", "newton_lu", "rates", "rate_lu")
@@ -45,7 +48,7 @@ def collect(p, observation, numbers, status):
 
 
 @compiled(nogil=True)
-def run_some(addresses, areas, which, actions, observations, numbers, status, done, ahead):
+def run_some(addresses, areas, which, actions, observations, numbers, status, ahead, done):
     """A control period of worlds which[k] that no other thread has taken, until all are done.
 
     `done` counts those that are taken; the world `ahead` of them is fetched. Where the solver gives up, `status` holds
@@ -61,6 +64,19 @@ def run_some(addresses, areas, which, actions, observations, numbers, status, do
             collect(p, observations[i], numbers[i], status[i])
         else:
             status[i, STATUS.code] = ints(p, PLANT.status)[STATUS.code]
+        k = claim(done)
+
+
+@compiled(nogil=True)
+def open_some(addresses, settings, which, observations, numbers, status, codes, done):
+    """Open episodes of the worlds which[k] that no other thread has taken; `codes` holds what came of each."""
+    k = claim(done)
+    while k < which.shape[0]:
+        i = which[k]
+        p = table_at(addresses[i], FIELDS)
+        codes[k] = open_episode(p, table_at(settings[i], SETTING_FIELDS))
+        if codes[k] == OPEN:
+            collect(p, observations[i], numbers[i], status[i])
         k = claim(done)
 
 
@@ -80,21 +96,31 @@ class Batch:
 
     def __init__(self, size: int, observed: int, threads: int | None = None) -> None:
         self.threads = min(size, threads or _cores())
-        self._addresses, self._areas = np.zeros(size, np.int64), np.zeros((size, AREAS, 2), np.int64)
+        self._addresses, self._settings = np.zeros(size, np.int64), np.zeros(size, np.int64)
+        self._areas = np.zeros((size, AREAS, 2), np.int64)
         # Compiled code knows addresses only: what they point to is kept here.
-        self.worlds: list[Packed | None] = [None] * size
+        self.worlds: list[tuple[Packed, Packed] | None] = [None] * size
         self.observations = np.zeros((size, observed), np.float32)
         self.numbers = np.zeros((size, len(NUMBERS)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
         # The thread that calls works, too.
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
-    def put(self, i: int, world: Packed) -> None:
-        """World i is that of a packed Plant."""
-        if self.worlds[i] is not world:
-            self._areas[i] = areas_of(world, BESIDE)
-        self.worlds[i], self._addresses[i] = world, world.table.ctypes.data
+    def put(self, i: int, world: Packed, setting: Packed) -> None:
+        """World i is that of a packed Plant, which a packed Setting opens."""
+        if self.worlds[i] != (world, setting):
+            self.worlds[i], self._areas[i] = (world, setting), areas_of(world, BESIDE)
+            self._addresses[i], self._settings[i] = world.table.ctypes.data, setting.table.ctypes.data
         collect(world.table, self.observations[i], self.numbers[i], self.status[i])
+
+    def open(self, which: np.ndarray) -> np.ndarray:
+        """Open the episodes of the worlds `which`, shape (k,), as their settings say; gives what came of each."""
+        codes = np.zeros(len(which), np.int64)
+        self._share(
+            len(which), open_some, self._addresses, self._settings, which, self.observations, self.numbers, self.status,
+            codes,
+        )  # fmt: skip
+        return codes
 
     def run(self, which: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, 2).
@@ -102,12 +128,16 @@ class Batch:
         Returns:
             Those whose solver gave up.
         """
-        helpers = min(self.threads, len(which)) - 1
-        share = partial(
-            run_some, self._addresses, self._areas, which, actions, self.observations, self.numbers, self.status,
-            np.zeros(1, np.int64), helpers + 1,
+        self._share(
+            len(which), run_some, self._addresses, self._areas, which, actions, self.observations, self.numbers,
+            self.status, min(self.threads, len(which)),
         )  # fmt: skip
-        jobs = [self._pool.submit(share) for _ in range(helpers)] if self._pool else []
+        return which[self.status[which, STATUS.code] != DONE]
+
+    def _share(self, count: int, work: Callable, *arguments: Any) -> None:
+        """Do `count` pieces of work on all threads; its last argument counts those that are taken."""
+        share = partial(work, *arguments, np.zeros(1, np.int64))
+        jobs = [self._pool.submit(share) for _ in range(min(self.threads, count) - 1)] if self._pool else []
         try:
             share()
         finally:
@@ -115,7 +145,6 @@ class Batch:
             wait(jobs)
         for job in jobs:
             job.result()
-        return which[self.status[which, STATUS.code] != DONE]
 
     def close(self) -> None:
         """End the threads."""

@@ -1,7 +1,7 @@
 """What threads that share work need: a counter that each raises by itself, and memory fetched ahead of its use.
 
-A world is some 150 kB that are read once a control period. Where many worlds take turns they lie in the slow caches, and
-a fifth of the time would go into waiting for them.
+A world is some 150 kB that are read once a control period. Where many worlds take turns they lie in the slow caches,
+and a fifth of the time would go into waiting for them.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def fetch_ahead(areas):
 
 
 def areas_of(packed: Packed, beside: Collection[str]) -> np.ndarray:
-    """Where the arrays of a packed NamedTuple lie, but for fields of some names, for `fetch_ahead`; shape (AREAS, 2)."""
+    """Areas for `fetch_ahead` of the arrays of a packed NamedTuple, but for fields of some names; shape (AREAS, 2)."""
     merged: list[list[int]] = []
     for first, size in sorted(_arrays(packed, beside)):
         if merged and first - sum(merged[-1]) < GAP:

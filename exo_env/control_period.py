@@ -164,13 +164,19 @@ def set_inputs(p):
 
 
 @compiled
+def options_of(p):
+    """Options of the solver."""
+    o = floats(p, PLANT.options)
+    return Options(o[0], o[1], o[2], o[3], o[4], o[5], o[6], int(o[7]), int(o[8]))
+
+
+@compiled
 def move(p):
     """Advance the DAE to the end of the period under way; gives the solver's code."""
-    o, status = floats(p, PLANT.options), ints(p, PLANT.status)
-    options = Options(o[0], o[1], o[2], o[3], o[4], o[5], o[6], int(o[7]), int(o[8]))
+    status = ints(p, PLANT.status)
     end = (status[STATUS.step] + 1) * floats(p, PLANT.period)[0]
     nothing = matrix(p, PLANT.drive)[:0]
-    code, _ = advance(inner(p, PLANT.model), inner(p, PLANT.world), options, end, nothing, 0)
+    code, _ = advance(inner(p, PLANT.model), inner(p, PLANT.world), options_of(p), end, nothing, 0)
     status[STATUS.code] = code
     return code
 

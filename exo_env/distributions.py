@@ -14,12 +14,15 @@ Each takes exactly one uniform number from 0 to 1 and returns its quantile, so t
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import ndtr, ndtri
 
 from dms_core.errors import InputError, choices
+from exo_env.jit import compiled
 from exo_env.settings import Settings
 
 Value = float | str
@@ -168,3 +171,62 @@ def distribution(spec: Any) -> Distribution:
             if kind in spec:
                 return cls(**spec)
     raise InputError(f"{spec!r} is no distribution; a value or one of {choices(KINDS)} is wanted.")
+
+
+STRAIGHT, LOGARITHMIC, NORMAL, OTHER = range(4)
+"""How a row of `Draws` gives a quantile."""
+
+
+class Draws:
+    """Several distributions of numbers, drawn from at once.
+
+    Args:
+        spreads: one for each number.
+    """
+
+    def __init__(self, spreads: Sequence[Distribution]) -> None:
+        self._spreads = tuple(spreads)
+        rows = [_drawing(d) for d in spreads]
+        self._kinds = np.array([kind for kind, _ in rows], np.int64)
+        self._numbers = np.array([numbers for _, numbers in rows], dtype=float)
+        self._others = np.flatnonzero(self._kinds == OTHER).tolist()
+        self._normal = np.flatnonzero(self._kinds == NORMAL)
+
+    def sample(self, generator: np.random.Generator) -> np.ndarray:
+        """One number of each, shape (n,), from as many uniform numbers in the same order."""
+        p = generator.random(len(self._spreads))
+        x = p.copy()
+        if len(self._normal):
+            low, span = self._numbers[self._normal, 4], self._numbers[self._normal, 5]
+            x[self._normal] = ndtri(low + p[self._normal] * span)
+        _quantiles(self._kinds, self._numbers, x)
+        for k in self._others:
+            x[k] = self._spreads[k].quantile(float(p[k]))
+        return x
+
+
+def _drawing(d: Distribution) -> tuple[int, tuple[float, ...]]:
+    """Kind, and low, high, and what else `_quantiles` wants of it."""
+    if isinstance(d, Uniform):
+        return STRAIGHT, (*d.uniform, 0.0, 0.0, 0.0, 0.0)
+    if isinstance(d, LogUniform):
+        low, high = d.log_uniform
+        return LOGARITHMIC, (low, high, math.log(high / low), 0.0, 0.0, 0.0)
+    if isinstance(d, Normal):
+        n = d.normal
+        low, high = (float(ndtr((x - n.mean) / n.deviation)) for x in (n.low, n.high))
+        return NORMAL, (n.low, n.high, n.mean, n.deviation, low, high - low)
+    return OTHER, (0.0,) * 6
+
+
+@compiled
+def _quantiles(kinds, numbers, x):
+    """Probabilities (of a normal distribution: its standard quantiles) in x become values."""
+    for k in range(x.shape[0]):
+        low, high = numbers[k, 0], numbers[k, 1]
+        if kinds[k] == STRAIGHT:
+            x[k] = low + x[k] * (high - low)
+        elif kinds[k] == LOGARITHMIC:
+            x[k] = min(max(low * math.exp(x[k] * numbers[k, 2]), low), high)
+        elif kinds[k] == NORMAL:
+            x[k] = min(max(numbers[k, 2] + numbers[k, 3] * x[k], low), high)

@@ -150,9 +150,10 @@ def reset_effort(par, state, n, period, wanted, phase):
             state[STATE.memory + (RING.drive + k) * n + i] = drive
 
 
-def start_excitations(state: np.ndarray, n: int) -> np.ndarray:
-    """Excitations behind `reset_effort`, without tremor [-], shape (6,): activations of a consistent start."""
-    return np.clip(state[STATE.memory + RING.drive * n :: n][:N], MINIMUM, 1.0)
+@compiled
+def start_excitation(state, n, k):
+    """Excitation of muscle k behind `reset_effort`, without tremor [-]: its activation in a consistent start."""
+    return min(max(state[STATE.memory + (RING.drive + k) * n], MINIMUM), 1.0)
 
 
 @compiled
@@ -236,7 +237,7 @@ class Effort:
         """
         phase = self.generator.uniform(0.0, 2.0 * math.pi)
         reset_effort(self.numbers, self.state, self._samples, self.period, _activations(wanted), phase)
-        return start_excitations(self.state, self._samples)
+        return np.array([start_excitation(self.state, self._samples, k) for k in range(N)])
 
     def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0) -> np.ndarray:
         """Excitations at the end of the coming control period [-], shape (6,).

@@ -27,16 +27,26 @@ class Episode:
 
     Args:
         rig: device, machine and world.
-        patient: who.
+        who: the patient as a row of numbers in the order of FIELDS.
         load: weight on the machine [kg].
-        repetition: the movement.
+        movement: the repetition as a row of numbers in the order of MOVEMENT.
         need: of the patient on this movement.
     """
 
-    def __init__(self, rig: Rig, patient: Patient, load: float, repetition: Repetition, need: Need) -> None:
-        self.rig, self.patient, self.load, self.repetition, self.need = rig, patient, load, repetition, need
+    def __init__(self, rig: Rig, who: np.ndarray, load: float, movement: np.ndarray, need: Need) -> None:
+        self.rig, self.who, self.load, self.movement, self.need = rig, who, load, movement, need
         self.course = rig.plant.course.copy()
         """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at the control times, shape (n, 3)."""
+
+    @cached_property
+    def patient(self) -> Patient:
+        """Who."""
+        return Patient.of_row(self.who)
+
+    @cached_property
+    def repetition(self) -> Repetition:
+        """The movement, with how often it is done."""
+        return Repetition.of_row(self.movement)
 
     @property
     def drive(self) -> Drive:

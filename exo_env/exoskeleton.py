@@ -8,8 +8,8 @@ point slides in the plane. With a line or a slider instead, rows are redundant a
 
 from __future__ import annotations
 
-from math import radians
-from typing import Any, Literal
+import math
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -29,7 +29,9 @@ from dms_core.model import (
 )
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.frames import quaternion, quaternion_product
+from dms_core.model.rotations import dot, sub
 from exo_env.human import Arm
+from exo_env.jit import compiled
 from exo_env.settings import Settings
 
 UPPER, LOWER, HINGE, GUIDE, PID = "upper_link", "lower_link", "exo_hinge", "guide", "pid"
@@ -45,6 +47,10 @@ class Link(Settings):
     mass: float = Field(gt=0.0, description="mass [kg]")
     centre_of_mass: Vector = Field(description="[m]")
     inertia: Vector = Field(description="principal moments about the centre of mass [kg m^2]")
+
+    def numbers(self) -> np.ndarray:
+        """Mass [kg] and centre of mass [m], shape (4,)."""
+        return np.array([self.mass, *self.centre_of_mass])
 
 
 class Rope(Settings):
@@ -102,16 +108,26 @@ class Exoskeleton(Settings):
     def moment_arm(self, rope: RopeName, angle: float) -> float:
         """-dl/dtheta of a rope at a hinge angle [rad]; positive where its tension flexes [m]."""
         ends: Rope = getattr(self, rope)
-        c, s = np.cos(angle), np.sin(angle)
-        x, y, z = ends.lower
-        lower = np.array([c * x - s * y, s * x + c * y, z])
-        d = lower - np.array(ends.upper)
-        return float(d[0] * lower[1] - d[1] * lower[0]) / float(np.linalg.norm(d))
+        return rope_lever(np.array(ends.upper), np.array(ends.lower), angle)
 
-    def own_moment(self, angle: Any, gravity: float) -> Any:
-        """Moment that holds the lower link at a hinge angle, or at several [rad] [Nm]; gravity in m/s^2."""
-        x, y, _ = self.lower_link.centre_of_mass
-        return self.lower_link.mass * gravity * (x * np.cos(angle) - y * np.sin(angle))
+    def own_moment(self, angle: float, gravity: float) -> float:
+        """Moment that holds the lower link at a hinge angle [rad] [Nm]; gravity in m/s^2."""
+        return link_moment(self.lower_link.numbers(), angle, gravity)
+
+
+@compiled
+def rope_lever(upper, lower, angle):
+    """-dl/dtheta of a rope from a point of the upper link to one of the lower, at a hinge angle [rad] [m]."""
+    c, s = math.cos(angle), math.sin(angle)
+    end = (c * lower[0] - s * lower[1], s * lower[0] + c * lower[1], lower[2])
+    d = sub(end, (upper[0], upper[1], upper[2]))
+    return (d[0] * end[1] - d[1] * end[0]) / math.sqrt(dot(d, d))
+
+
+@compiled
+def link_moment(link, angle, gravity):
+    """Moment that holds the lower link at a hinge angle [rad] [Nm]; link: mass and centre of mass, shape (4,)."""
+    return link[0] * gravity * (link[1] * math.cos(angle) - link[2] * math.sin(angle))
 
 
 def link_axes(arm: Arm) -> np.ndarray:
@@ -142,7 +158,7 @@ class WornExoskeleton:
     def __init__(self, device: Exoskeleton, arm: Arm, misalignment: Misalignment, guide: GuideKind = "plane") -> None:
         self.device, self.arm, self.guide_kind = device, arm, guide
         axes = link_axes(arm)
-        about_x, about_y = (radians(x) for x in misalignment.tilt_deg)
+        about_x, about_y = (math.radians(x) for x in misalignment.tilt_deg)
         tilt = quaternion_product(quaternion((1, 0, 0), about_x), quaternion((0, 1, 0), about_y))
         self.axes = axes
         self.orientation = quaternion_product(_orientation(axes), tilt)

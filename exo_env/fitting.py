@@ -12,7 +12,7 @@ length of the gym rope and the start of what moves are not linear; start_kernel.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,9 @@ from dms_core.model.signals import AnySignal
 from exo_env.actions import DRIVES, Drive, drive_inputs
 from exo_env.ecosystem import Ecosystem
 from exo_env.human import HEIGHT_0, MASS_0, MUSCLES, Arm, Person
+from exo_env.jit import compiled
 from exo_env.motor_command import arm_table
-from exo_env.patient import Patient
+from exo_env.patient import SEXES, Patient, Sex
 
 TEMPLATE_ANGLE = 1.0
 """Elbow angle at which the elimination orders are chosen [rad], amid the exercise."""
@@ -91,18 +92,29 @@ def template(mode: str) -> Model:
     return Model(declared(Ecosystem(), used, TEMPLATE_ANGLE, used.start(0.0)))
 
 
-def monomials(person: Person, weight: float, times: dict[str, float]) -> np.ndarray:
-    """phi, with sizes as multiples of arm26's, shape (MONOMIALS,).
+@compiled
+def put_monomials(body_mass, height, strength, weight, rise, fall, phi):
+    """Fill phi, shape (MONOMIALS,), with sizes as multiples of arm26's.
 
     Args:
-        person: who.
-        weight: [kg].
-        times: activation and deactivation time constants as fields of ThelenMuscle [s].
+        body_mass: [kg].
+        height: [m].
+        strength: factor on every muscle's F0 [-].
+        weight: on the machine [kg].
+        rise: activation time constant [s].
+        fall: deactivation time constant [s].
+        phi: filled.
     """
-    m, h = person.body_mass / MASS_0, person.height / HEIGHT_0
-    rise, fall = times["activation_time_constant"], times["deactivation_time_constant"]
-    sizes = (1.0, h, h * h, m, m * h * h, weight, person.strength * m / h)
-    return np.array([*sizes, 100.0 * rise, 100.0 * fall, 0.01 / min(rise, fall)])
+    m, h = body_mass / MASS_0, height / HEIGHT_0
+    phi[0], phi[1], phi[2], phi[3], phi[4], phi[5] = 1.0, h, h * h, m, m * h * h, weight
+    phi[6], phi[7], phi[8], phi[9] = strength * m / h, 100.0 * rise, 100.0 * fall, 0.01 / min(rise, fall)
+
+
+def monomials(person: Person, weight: float, times: dict[str, float]) -> np.ndarray:
+    """phi of a person, shape (MONOMIALS,); times: activation and deactivation time constants of ThelenMuscle [s]."""
+    phi = np.empty(MONOMIALS)
+    put_monomials(person.body_mass, person.height, person.strength, weight, *times.values(), phi)
+    return phi
 
 
 def numbers_of(model: Model, arm: Arm) -> Numbers:
@@ -123,20 +135,34 @@ class Fitting:
 
     def __init__(self, ecosystem: Ecosystem, mode: str, drive: Drive) -> None:
         self.ecosystem, self.mode, self.drive = ecosystem, mode, drive
-        self._coefficients: dict[str, np.ndarray] = {}
+        self._known: set[str] = set()
         self._parts: list[tuple[int, int, tuple[int, ...]]] = []
+        self.both = np.zeros((0, MONOMIALS))
+        """C of men, then of women, as far as they were asked for, shape (2 n, MONOMIALS)."""
 
     def numbers(self, patient: Patient, weight: float) -> Numbers:
         """Of a patient who lifts a weight [kg]."""
-        sex = patient.sex
-        if sex not in self._coefficients:
-            self._coefficients[sex] = self._found(sex)
-        x = self._coefficients[sex] @ monomials(patient.person, weight, patient.time_constants(Arm()))
+        C = self.coefficients(patient.sex)
+        return self.split(C @ monomials(patient.person, weight, patient.time_constants(Arm())))
+
+    def split(self, x: np.ndarray) -> Numbers:
+        """C phi, shape (n,), as views of its parts."""
         parts = [x[first:end].reshape(shape) for first, end, shape in self._parts]
         count = len(parts) - len(Numbers._fields) + 1
         return Numbers(tuple(parts[:count]), *parts[count:])
 
-    def _found(self, sex: Literal["male", "female"]) -> np.ndarray:
+    def coefficients(self, sex: Sex) -> np.ndarray:
+        """C, shape (n, MONOMIALS)."""
+        if sex not in self._known:
+            C = self._found(sex)
+            if not self._known:
+                self.both = np.zeros((len(SEXES) * len(C), MONOMIALS))
+            self.both[SEXES.index(sex) * len(C) :][: len(C)] = C
+            self._known.add(sex)
+        n = len(self.both) // len(SEXES)
+        return self.both[SEXES.index(sex) * n :][:n]
+
+    def _found(self, sex: Sex) -> np.ndarray:
         """C, shape (numbers, MONOMIALS)."""
         rng, rows, found = np.random.default_rng(0), [], []
         for _ in range(MONOMIALS):

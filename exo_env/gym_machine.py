@@ -14,7 +14,9 @@ from dms_core.errors import InputError
 from dms_core.model import GROUND, JointSpringDamper, PathPoint, Revolute, RigidBody, RopeLength, Slider
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.frames import quaternion
+from dms_core.model.rotations import dot, sub
 from exo_env.human import Arm
+from exo_env.jit import compiled
 from exo_env.settings import Settings
 from exo_env.start_kernel import handle_angle
 
@@ -41,6 +43,17 @@ class GymMachine(Settings):
     weight_inertia: float = Field(gt=0.0, description="inertia over mass of the weight [m^2]")
 
 
+@compiled
+def out_of_reach(reach, room, elbow, low_pulley):
+    """Whether the rope's ends stay off the pulleys.
+
+    The handle's end goes as far as `reach` [m] from the elbow; the weight begins `room` [m] below the high pulley, and
+    can rise by twice that reach.
+    """
+    d = sub(low_pulley, elbow)
+    return room > 2.0 * reach and dot(d, d) > reach * reach
+
+
 def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> None:
     """Refuses a machine whose rope an arm could bring to a pulley: its length has a kink there.
 
@@ -55,16 +68,17 @@ def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> Non
     # The rope's end is in a disc of twice this width.
     reach = math.hypot(*grip) + machine.handle.length
     room, from_low = machine.high_pulley[1] - machine.weight_start, math.dist(elbow, machine.low_pulley)
+    if out_of_reach(reach, room, tuple(elbow), machine.low_pulley):
+        return
     if room <= 2.0 * reach:
         raise InputError(
             f"high_pulley = {machine.high_pulley} is {room:.4g} m above weight_start = {machine.weight_start}; the "
             f"weight can rise by {2.0 * reach:.4g} m, and the pulley must be higher."
         )
-    if from_low <= reach:
-        raise InputError(
-            f"low_pulley = {machine.low_pulley} is {from_low:.4g} m from the elbow, and the handle reaches "
-            f"{reach:.4g} m; it must be out of reach."
-        )
+    raise InputError(
+        f"low_pulley = {machine.low_pulley} is {from_low:.4g} m from the elbow, and the handle reaches "
+        f"{reach:.4g} m; it must be out of reach."
+    )
 
 
 class LoadedMachine:

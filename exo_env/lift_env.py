@@ -24,9 +24,10 @@ from exo_env.episode import Episode
 from exo_env.events import NOTHING, SOLVER, Limits, event
 from exo_env.lift_settings import SOLVER_OPTIONS, TIME, load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
+from exo_env.patient import fields_of
 from exo_env.population import Source, population
 from exo_env.readout import Readout
-from exo_env.repetition import MOST_REPETITIONS, Repetitions
+from exo_env.repetition import MOST_REPETITIONS, MOVED, MOVEMENT, Repetitions
 from exo_env.rewards import TERMS, Weights
 from exo_env.rig import Rig
 from exo_env.scene import Scene
@@ -172,10 +173,9 @@ class ElbowLiftEnv(gymnasium.Env):
                 raise InputError(f"{name} = {value!r}; a number from {low:g} to {high:g} is wanted.")
         self.render_mode, self.metadata = render_mode, {**type(self).metadata, "render_fps": round(control_rate)}
         self.period, self.duration = 1.0 / control_rate, float(episode_duration or TIME * repetitions)
-        self._often = {"count": repetitions, "every": self.duration / repetitions}
         self.population = population(patient)
         self.load = load_distribution(load)
-        self.repetitions = Repetitions.of(reference)
+        self._often, self.repetitions = repetitions, Repetitions.of(reference)
         self.ecosystem = Ecosystem(device=worn_device(exoskeleton))
         self.action_mode, self.drive = action_mode, drive(action_mode, dict(drive_settings or {}))
         self.weights, self.limits = Weights(**(reward_weights or {})), Limits(**(limits or {}))
@@ -213,44 +213,57 @@ class ElbowLiftEnv(gymnasium.Env):
         Raises:
             InputError: an option is unknown or not usable.
         """
-        super().reset(seed=seed)
-        self._over, self._episode = True, None
-        self._begin(options or {})
-        self._over = False
+        self.prepare(seed, options)
+        self.opened(self.rig.open())
         if self.render_mode == "human":
             self.render()
-        return self._plant.observation.astype(np.float32), self._start_info()
+        return self._plant.observation.astype(np.float32), self.start_info()
 
-    def _begin(self, options: Mapping[str, Any]) -> None:
-        """Draw an episode; what is fixed draws from a generator of its own, so as not to shift what is not."""
-        for name in options:
-            if name not in OPTIONS:
-                raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
-        patient = self.population.sample(self.np_random)
+    def prepare(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
+        """First part of a reset: draw an episode. The second opens it in compiled code, the third is `opened`."""
+        super().reset(seed=seed)
+        self._over, self._episode = True, None
+        self.rig.prepare(*self._drawn(options or {}), self.np_random)
+
+    def opened(self, code: int) -> None:
+        """Last part of a reset, with what came of the opening."""
+        self._episode = self.rig.opened(code)
+        self._readout = Readout(self._episode, self._plant)
+        self._over = False
+
+    def _drawn(self, options: Mapping[str, Any]) -> tuple[np.ndarray, float, np.ndarray, float]:
+        """Patient, load [kg], movement and start [rad]; what is fixed is drawn all the same, and shifts nothing else.
+
+        What is fixed to a distribution draws from a generator of its own.
+        """
+        patient = self.population.draw(self.np_random)
         load = float(self.load.quantile(self.np_random.random()))
-        repetition = self.repetitions.sample(self.np_random)
+        movement = self.repetitions.draw(self.np_random)
         seed = int(self.np_random.integers(2**63))
-        fixed = np.random.default_rng(seed)
-        if "patient" in options:
-            patient = population(options["patient"]).sample(fixed)
-        if "load" in options:
-            load = float(load_distribution(options["load"]).quantile(fixed.random()))
-        if "reference" in options:
-            repetition = Repetitions.of(options["reference"]).sample(fixed)
-        start_deg = options.get("initial_angle_deg", repetition.start_deg)
+        start_deg = movement[MOVEMENT.start_deg]
+        if options:
+            for name in options:
+                if name not in OPTIONS:
+                    raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
+            fixed = np.random.default_rng(seed)
+            if "patient" in options:
+                patient = population(options["patient"]).draw(fixed)
+            if "load" in options:
+                load = float(load_distribution(options["load"]).quantile(fixed.random()))
+            if "reference" in options:
+                movement = Repetitions.of(options["reference"]).draw(fixed)
+            start_deg = options.get("initial_angle_deg", movement[MOVEMENT.start_deg])
         low, high = self.limits.lowest_deg, self.limits.highest_deg
         if not within(start_deg, low, high):
             raise InputError(f"initial_angle_deg = {start_deg!r}; a number from {low:g} to {high:g} is wanted.")
-        repetition = repetition.model_copy(update=self._often)
-        self._episode = self.rig.begin(patient, load, repetition, math.radians(start_deg), self.np_random)
-        self._readout = Readout(self._episode, self._plant)
+        return patient, load, movement, math.radians(start_deg)
 
     @cached_property
     def rig(self) -> Rig:
         """The world, in which all episodes take place."""
         return Rig(
             self.ecosystem, self.action_mode, self.drive, period=self.period, duration=self.duration,
-            repetitions=int(self._often["count"]), observer=self.observer, weights=self.weights, limits=self.limits,
+            repetitions=self._often, observer=self.observer, weights=self.weights, limits=self.limits,
             options=self.solver,
         )  # fmt: skip
 
@@ -331,14 +344,14 @@ class ElbowLiftEnv(gymnasium.Env):
         """Unit of each sensor in `readings`."""
         return dict(self.episode.model.layout.outputs)
 
-    def _start_info(self) -> dict[str, Any]:
+    def start_info(self) -> dict[str, Any]:
         """What the episode is made of."""
         e = self.episode
         return {
-            "patient": e.patient.model_dump(),
+            "patient": fields_of(e.who.tolist()),
             "load": e.load,
             "ability": e.need.ability,
-            "reference": e.repetition.model_dump(),
+            "reference": dict(zip(MOVED, e.movement.tolist(), strict=False)),
             "initial_angle_deg": math.degrees(self._readout.angle),
         }
 

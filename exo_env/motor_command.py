@@ -159,9 +159,14 @@ def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> 
         SWEEPS, RELAXATION, SETTLED, moment, activations,
     )  # fmt: skip
     if not change < SETTLED:
-        raise SimulationError(
-            f"the motor command does not settle: after {SWEEPS} iterations between tendon strain and activation an "
-            f"activation still changes by {change:.3g}; below {SETTLED:g} is wanted. Check the person's muscles and "
-            f"the movement of {times[-1]:.4g} s."
-        )
+        raise unsettled(change, float(times[-1]))
     return MotorCommand(times, activations, moment, shortage)
+
+
+def unsettled(change: float, duration: float) -> SimulationError:
+    """The error of a command that does not settle in a movement of that duration [s]."""
+    return SimulationError(
+        f"the motor command does not settle: after {SWEEPS} iterations between tendon strain and activation an "
+        f"activation still changes by {change:.3g}; below {SETTLED:g} is wanted. Check the person's muscles and "
+        f"the movement of {duration:.4g} s."
+    )

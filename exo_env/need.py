@@ -20,11 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.command_kernel import needed_moments
-from exo_env.exoskeleton import Exoskeleton
-from exo_env.human import FLEXORS, MUSCLES
+from dms_core.model.rotations import dot, vec
+from exo_env.command_kernel import muscle_moment, needed_moment
+from exo_env.effort import SIGN, N
+from exo_env.exoskeleton import Exoskeleton, link_moment
+from exo_env.jit import compiled
 from exo_env.motor_command import InternalModel
-from exo_env.patient import Patient
+from exo_env.patient import PATIENT, Patient
 
 MIDDLE = math.radians(60.0)
 """Angle of the ability [rad]."""
@@ -34,13 +36,39 @@ SMALLEST_SCALE = 1.0
 """Of the need, where a movement hardly needs anything [Nm]."""
 
 
+@compiled
+def voluntary(patient, arm, angle):
+    """Largest static elbow moment that a patient (numbers as PATIENT) can want at an angle [rad] [Nm]."""
+    rested = 1.0 - patient[PATIENT.fatigued_at_start]
+    flexors, extensors = patient[PATIENT.maximum_activation_flexors], patient[PATIENT.maximum_activation_extensors]
+    against, given = min(patient[PATIENT.co_contraction] * flexors, extensors * rested), np.empty(N)
+    for i in range(N):
+        given[i] = max(flexors * rested if SIGN[i] > 0.0 else against, MINIMUM)
+    return muscle_moment(arm, angle, given)
+
+
+@compiled
+def able(patient, arm, load):
+    """Share of arm and load that a patient can hold [-]; tables as in command_kernel.py."""
+    hold = needed_moment(arm, load, MIDDLE, 0.0, 0.0)
+    return min(max(voluntary(patient, arm, MIDDLE) / hold, 0.0), 1.0) if hold > 0.0 else 1.0
+
+
+@compiled
+def put_lacking(patient, arm, load, link, course, lacking):
+    """Fill M_lack [Nm] along a course; gives ability and scale of `Need`."""
+    ability, total, gravity = able(patient, arm, load), 0.0, vec(load.gravity, 0)
+    g = math.sqrt(dot(gravity, gravity))
+    for k in range(course.shape[0]):
+        needed = max(needed_moment(arm, load, course[k, 0], course[k, 1], course[k, 2]), 0.0)
+        total += needed
+        lacking[k] = (1.0 - ability) * needed + link_moment(link, course[k, 0], g)
+    return ability, max(total / course.shape[0], SMALLEST_SCALE)
+
+
 def voluntary_moment(patient: Patient, known: InternalModel, angle: float = MIDDLE) -> float:
     """Largest static elbow moment that the patient can want [Nm]."""
-    rested = 1.0 - patient.fatigued_at_start
-    flexors, extensors = patient.maximum_activation_flexors, patient.maximum_activation_extensors
-    against = min(patient.co_contraction * flexors, extensors * rested)
-    given = [flexors * rested if m in FLEXORS else against for m in MUSCLES]
-    return known.muscle_moment(angle, np.maximum(given, MINIMUM))
+    return voluntary(patient.numbers(), known.arm, angle)
 
 
 def ability(patient: Patient, known: InternalModel) -> float:
@@ -50,8 +78,7 @@ def ability(patient: Patient, known: InternalModel) -> float:
         patient: who.
         known: arm, machine and real weight.
     """
-    hold = known.resting_moment(MIDDLE)
-    return min(max(voluntary_moment(patient, known) / hold, 0.0), 1.0) if hold > 0.0 else 1.0
+    return able(patient.numbers(), known.arm, known.load)
 
 
 @dataclass(frozen=True)
@@ -75,11 +102,8 @@ class Need:
             device: whose lower link is carried.
             course: psi [rad], its rate and its acceleration at the control times, shape (n, 3).
         """
-        arm, load, able = known.arm, known.load, ability(patient, known)
-        g = float(np.linalg.norm(load.gravity))
-        needed = np.zeros(len(course))
-        needed_moments(arm, load, course, needed)
-        needed = np.maximum(needed, 0.0)
-        return cls(
-            able, (1.0 - able) * needed + device.own_moment(course[:, 0], g), max(float(needed.mean()), SMALLEST_SCALE)
+        lacking = np.zeros(len(course))
+        found, scale = put_lacking(
+            patient.numbers(), known.arm, known.load, device.lower_link.numbers(), np.ascontiguousarray(course), lacking
         )
+        return cls(found, lacking, scale)

@@ -30,7 +30,8 @@ numbers; the rates of [Rakshit 2021] are those that MyoSuite quotes from it.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from collections.abc import Iterable
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -38,6 +39,8 @@ from pydantic import Field
 from exo_env.human import HEIGHT_0, MASS_0, Arm, Person
 from exo_env.settings import Settings
 
+Sex = Literal["male", "female"]
+SEXES: tuple[Sex, ...] = ("male", "female")
 LONGEST_DELAY = 0.5
 """Longest delay of a patient [s]; the memory of a patient is as long."""
 
@@ -165,9 +168,29 @@ class Patient(Settings):
         names["deactivation_time_constant"] = self.deactivation_time_scale
         return {name: scale * facts[name] for name, scale in names.items()}
 
+    @classmethod
+    def of_row(cls, row: Iterable[float]) -> Self:
+        """The patient of a row of numbers in the order of FIELDS, the sex by its place in SEXES."""
+        return cls(**fields_of(row))
+
+    def row(self) -> np.ndarray:
+        """All fields as numbers, shape (len(FIELDS),); `of_row` takes them back."""
+        values = {**dict(self), "sex": SEXES.index(self.sex)}
+        return np.array([values[name] for name in FIELDS], dtype=float)
+
     def numbers(self) -> np.ndarray:
         """What the compiled dynamics reads, laid out as `PATIENT`, shape (len(PATIENT),)."""
         return np.array([getattr(self, name) for name in PATIENT._fields], dtype=float)
+
+
+FIELDS = tuple(Patient.model_fields)
+"""Order of a patient's row of numbers."""
+
+
+def fields_of(row: Iterable[float]) -> dict[str, Any]:
+    """Fields of a patient from its row of numbers."""
+    found: dict[str, Any] = dict(zip(FIELDS, map(float, row), strict=True))
+    return found | {"sex": SEXES[int(found["sex"])]}
 
 
 class PatientIndex(NamedTuple):

@@ -64,10 +64,3 @@ def plant_of(
         observation=zeros(n), action=zeros(2), before=zeros(2), weights=weights.numbers(), limits=limits.numbers(),
         terms=zeros(len(TERMS)), reward=zeros(1), status=status,
     ))  # fmt: skip
-
-
-def clear(plant: Plant) -> None:
-    """Forget the last episode: nothing done, nothing read."""
-    for x in (plant.excitations, plant.stretch, plant.y, plant.reading, plant.memory, plant.action, plant.before,
-              plant.terms, plant.reward, plant.status[: STATUS.steps]):  # fmt: skip
-        x[...] = 0

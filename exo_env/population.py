@@ -26,8 +26,8 @@ from pydantic import Field, model_validator
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from dms_core.yaml_text import read_yaml
-from exo_env.distributions import Distribution, distribution, weighted
-from exo_env.patient import Patient
+from exo_env.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
+from exo_env.patient import FIELDS, SEXES, Patient
 from exo_env.settings import Settings
 
 FOLDER = "patients"
@@ -102,10 +102,25 @@ class Population(Settings):
 
     def sample(self, generator: np.random.Generator) -> Patient:
         """A patient. Draws one number for the choice of each mixture and one for each field."""
+        return Patient.of_row(self.draw(generator))
+
+    def draw(self, generator: np.random.Generator) -> np.ndarray:
+        """As `sample`, a patient as `Patient.row` gives it; what is checked of a population holds for all of these."""
         if self.mixture:
             chosen = weighted(tuple(self.mixture.values()), generator.random())
-            return self.parts[chosen].sample(generator)
-        return _patient({name: d.quantile(generator.random()) for name, d in self.distributions.items()})
+            return self.parts[chosen].draw(generator)
+        draws, places = self._draws
+        row = np.empty(len(FIELDS))
+        row[places] = draws.sample(generator)
+        if BODY_MASS_INDEX in self.distributions:
+            row[FIELDS.index("body_mass")] *= row[FIELDS.index("height")] ** 2
+        return row
+
+    @cached_property
+    def _draws(self) -> tuple[Draws, np.ndarray]:
+        """Distributions as numbers, and the place of each in a patient's row."""
+        places = [FIELDS.index(_patient_field(name)) for name in self.distributions]
+        return Draws([_numeric(d) for d in self.distributions.values()]), np.array(places)
 
     def _check_fields(self) -> None:
         """Every field given once, and possible at the ends of its distribution.
@@ -177,6 +192,15 @@ def _distribution(name: str, spec: Any) -> Distribution:
         return distribution(spec)
     except InputError as error:
         raise InputError(f"fields: {name}: {error}") from None
+
+
+def _numeric(d: Distribution) -> Distribution:
+    """The same with places in SEXES instead of words."""
+    if isinstance(d, Constant) and isinstance(d.constant, str):
+        return Constant(constant=SEXES.index(d.constant))
+    if isinstance(d, Choice):
+        return d.changed(choice=tuple(SEXES.index(x) if isinstance(x, str) else x for x in d.choice))
+    return d
 
 
 def _patient(values: dict[str, Any]) -> Patient:

@@ -6,15 +6,17 @@ durations and pauses occur is a distribution a field, as in a population of pati
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Self
+import math
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.errors import InputError
 from dms_core.model import MinimumJerk
-from exo_env.distributions import distribution
+from exo_env.distributions import Draws, distribution
 from exo_env.jit import compiled
 from exo_env.settings import Settings
 
@@ -46,6 +48,16 @@ class Repetition(Settings):
             )
         return self
 
+    @classmethod
+    def of_row(cls, row: Iterable[float]) -> Self:
+        """The repetition of a row of numbers in the order of MOVEMENT."""
+        *given, often, every = map(float, row)
+        return cls(**dict(zip(MOVED, given, strict=True)), count=int(often), every=every)
+
+    def row(self) -> np.ndarray:
+        """All fields as numbers, shape (len(MOVEMENT),); `of_row` takes them back."""
+        return np.array([*(getattr(self, name) for name in MOVED), self.count, self.every], dtype=float)
+
     @property
     def signal(self) -> MinimumJerk:
         """psi(t) [rad]."""
@@ -67,6 +79,57 @@ class Repetition(Settings):
         pieces, found = self.signal.pieces(), np.empty((len(times), 3))
         course_of(pieces.t, pieces.c, np.asarray(times, float), found)
         return found
+
+
+class Movement(NamedTuple):
+    """Where each field of a repetition stands in its row of numbers."""
+
+    start_deg: int = 0
+    amplitude_deg: int = 1
+    rest: int = 2
+    duration: int = 3
+    pause: int = 4
+    often: int = 5
+    every: int = 6
+
+
+MOVEMENT = Movement()
+MOVED = MOVEMENT._fields[: MOVEMENT.often]
+"""Fields that are drawn."""
+
+
+@compiled
+def put_pieces(movement, t, c):
+    """Pieces of `Repetition.signal`, of a row of numbers in the order of MOVEMENT.
+
+    Args:
+        movement: shape (7,).
+        t: starts of the pieces [s], shape (n,), n from 4 count + 1. Where there is no rest between repetitions there
+            are fewer pieces, and the last stands for them.
+        c: their coefficients, shape (n, 6).
+    """
+    low = math.radians(movement[MOVEMENT.start_deg])
+    high = math.radians(movement[MOVEMENT.start_deg] + movement[MOVEMENT.amplitude_deg])
+    rest, move, pause = movement[MOVEMENT.rest], movement[MOVEMENT.duration], movement[MOVEMENT.pause]
+    between = max(movement[MOVEMENT.every], rest + 2.0 * move + pause) - (move + pause + move)
+    # A piece of rest before the first knot.
+    c[:], k, now = 0.0, 1, rest
+    t[0], t[1] = rest - 1.0, rest
+    c[0, 0] = c[1, 0] = low
+    for i in range(int(movement[MOVEMENT.often])):
+        if i > 0 and now + between > now:
+            now += between
+            k += 1
+            t[k], c[k, 0] = now, low
+        for time, value in ((move, high), (pause, high), (move, low)):
+            step = value - c[k, 0]
+            c[k, 3], c[k, 4], c[k, 5] = 10.0 * step / time**3, -15.0 * step / time**4, 6.0 * step / time**5
+            now += time
+            k += 1
+            t[k], c[k, 0] = now, value
+    for i in range(k + 1, t.shape[0]):
+        t[i] = t[k]
+        c[i] = c[k]
 
 
 @compiled
@@ -129,4 +192,12 @@ class Repetitions(Settings):
 
     def sample(self, generator: np.random.Generator) -> Repetition:
         """A repetition; one number is drawn for each field."""
-        return Repetition(**{name: self._spread(name).quantile(generator.random()) for name in type(self).model_fields})
+        return Repetition.of_row([*self.draw(generator), 1.0, 0.0])
+
+    def draw(self, generator: np.random.Generator) -> np.ndarray:
+        """As `sample`, the fields as numbers in the order of MOVEMENT, shape (5,)."""
+        return self._draws.sample(generator)
+
+    @cached_property
+    def _draws(self) -> Draws:
+        return Draws([self._spread(name) for name in MOVED])

@@ -84,11 +84,9 @@ class ElbowLiftVectorEnv(VectorEnv):
         options = dict(options or {})
         mask = self._mask(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        infos: dict[str, Any] = {}
         # A reset that fails half-way leaves nothing to step.
         self._over[mask], self._started = True, False
-        for i in np.flatnonzero(mask).tolist():
-            infos = self._add_info(infos, self._reset(i, seeds[i], options), i)
+        infos = self._begin(mask, {}, seeds, options)
         self._started = True
         return self._batch.observations.copy(), infos
 
@@ -112,12 +110,24 @@ class ElbowLiftVectorEnv(VectorEnv):
             raise InputError(f"{len(seed)} seeds for {self.num_envs} worlds; one seed, or one a world, is wanted.")
         return list(seed)
 
-    def _reset(self, i: int, seed: int | None = None, options: dict[str, Any] | None = None) -> dict[str, Any]:
-        """A new episode in world i; gives its info."""
-        _, info = self.envs[i].reset(seed=seed, options=options)
-        self._batch.put(i, self.envs[i].packed)
-        self._episodes[i], self._over[i] = self.envs[i].episode, False
-        return info
+    def _begin(
+        self,
+        where: np.ndarray,
+        infos: dict[str, Any],
+        seeds: Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> dict[str, Any]:
+        """New episodes in the worlds `where`, shape (num_envs,), opened on all threads; gives the infos with theirs."""
+        which = np.flatnonzero(where)
+        for i in which.tolist():
+            env = self.envs[i]
+            env.prepare(seeds[i] if seeds else None, options)
+            self._batch.put(i, env.packed, env.rig.setting)
+        for i, code in zip(which.tolist(), self._batch.open(which).tolist(), strict=True):
+            self.envs[i].opened(code)
+            self._episodes[i], self._over[i] = self.envs[i].episode, False
+            infos = self._add_info(infos, self.envs[i].start_info(), i)
+        return infos
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """A control period of every world.
@@ -139,13 +149,12 @@ class ElbowLiftVectorEnv(VectorEnv):
         which = np.flatnonzero(running)
         for i in self._batch.run(which, used):
             self.envs[i].rescue()
-            self._batch.put(i, self.envs[i].packed)
+            self._batch.put(i, self.envs[i].packed, self.envs[i].rig.setting)
         status = self._batch.status
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
         terminated = running & (status[:, STATUS.event] != NOTHING)
         truncated = running & (status[:, STATUS.step] == status[:, STATUS.steps])
-        infos = self._infos(running) if running.any() else {}
-        infos = self._autoreset(~running, infos)
+        infos = self._begin(~running, self._infos(running) if running.any() else {})
         self._over = terminated | truncated
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
             infos = self._same_step(self._over.copy(), infos)
@@ -161,12 +170,6 @@ class ElbowLiftVectorEnv(VectorEnv):
             raise InputError(f"actions[{i}] = {used[i].tolist()}; finite numbers are wanted.")
         return np.clip(used, -1.0, 1.0)
 
-    def _autoreset(self, waiting: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
-        """Begin the episodes of worlds that ended one at the step before."""
-        for i in np.flatnonzero(waiting).tolist():
-            infos = self._add_info(infos, self._reset(i), i)
-        return infos
-
     def _same_step(self, ended: np.ndarray, told: dict[str, Any]) -> dict[str, Any]:
         """Begin the episodes of worlds that ended one now; what they ended with is in final_obs and final_info."""
         last, infos = self._batch.observations.copy(), self._infos(~ended) if not ended.all() else {}
@@ -176,8 +179,7 @@ class ElbowLiftVectorEnv(VectorEnv):
             if "event" in told and told["_event"][i]:
                 final["event"] = told["event"][i]
             infos = self._add_info(infos, {"final_obs": last[i], "final_info": final}, i)
-            infos = self._add_info(infos, self._reset(i), i)
-        return infos
+        return self._begin(ended, infos)
 
     def _infos(self, running: np.ndarray) -> dict[str, Any]:
         """Of a step, as gymnasium's own vector environments give it: arrays, and masks of where they hold."""

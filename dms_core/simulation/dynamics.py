@@ -34,7 +34,7 @@ from dms_core.simulation.state import (
     Options,
     State,
     T,
-    put_start,
+    rewind,
     with_tables,
 )
 
@@ -157,7 +157,7 @@ class World:
 
         `step` is tried first [s], where something is known of how the inputs will move; 0 takes a careful one.
         """
-        put_start(self.state, q, v, step)
+        rewind(self._world.table, np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), step)
         self.result = Result.SUCCESS
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import Packed, fields
+from dms_core.assembly.arena import Packed, fields, floats, inner, ints
 from dms_core.assembly.sparsity import NewtonPattern, RatePattern
-from dms_core.assembly.tables import Calls, Signals, Work
+from dms_core.assembly.tables import WORK, Calls, Signals, Work
+from dms_core.jit import compiled
 from dms_core.linear.lu import LuTables, storage
 
 # Entries of State.clock [s, unless said].
@@ -124,24 +126,26 @@ def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.nd
         **{name: np.zeros(n) for name in histories}, **{name: np.zeros(m) for name in ("lam", "mu", "lam_before")},
         **_linear_arrays(tables),
     )  # fmt: skip
-    put_start(state, q, v)
-    return Packed(state)
+    packed = Packed(state)
+    rewind(packed.table, q, v, 0.0)
+    return packed
 
 
-def put_start(state: State, q: np.ndarray, v: np.ndarray, step: float = 0.0) -> None:
-    """Back to t = 0, at q and v of shape (n_q,), as if nothing had been computed; inputs stay.
+@compiled
+def rewind(s, q, v, step):
+    """A packed State back to t = 0, at q and v of shape (n_q,), as if nothing had been computed; inputs stay.
 
     `step` is tried first [s]; 0 takes a careful one.
     """
-    n, w = len(q), state.w
-    for x in (state.clock, state.counts, state.largest, state.vd, state.lam, state.mu, state.lam_before, w.lam, w.mu):
-        x[:] = 0
-    state.counts[RESTART] = state.counts[STALE] = 1
-    state.largest[H_LEAST], state.clock[H_WANTED] = np.inf, step
-    for x in (state.q, state.q_before, w.q[:n]):
-        x[:] = q
-    for x in (state.v, state.qd, state.v_before, w.v[:n]):
-        x[:] = v
+    clock, counts, largest = floats(s, STATE.clock), ints(s, STATE.counts), floats(s, STATE.largest)
+    w, n = inner(s, STATE.w), q.shape[0]
+    clock[:], counts[:], largest[:], floats(s, STATE.vd)[:] = 0.0, 0, 0.0, 0.0
+    floats(s, STATE.lam)[:], floats(s, STATE.mu)[:], floats(s, STATE.lam_before)[:] = 0.0, 0.0, 0.0
+    floats(w, WORK.lam)[:], floats(w, WORK.mu)[:] = 0.0, 0.0
+    counts[RESTART], counts[STALE] = 1, 1
+    largest[H_LEAST], clock[H_WANTED] = math.inf, step
+    floats(s, STATE.q)[:], floats(s, STATE.q_before)[:], floats(w, WORK.q)[:n] = q, q, q
+    floats(s, STATE.v)[:], floats(s, STATE.qd)[:], floats(s, STATE.v_before)[:], floats(w, WORK.v)[:n] = v, v, v, v
 
 
 def with_tables(tables: Tables, state: State) -> Packed:
