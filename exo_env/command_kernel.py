@@ -73,12 +73,17 @@ def turned(n, c, s, x):
 
 @compiled
 def path_geometry(arm, muscle, angle):
-    """(length [m], moment arm -dl/dtheta [m]) of a muscle at an elbow angle [rad].
+    """(length [m], moment arm -dl/dtheta [m]) of a muscle at an elbow angle [rad]."""
+    return path_at(arm, muscle, math.cos(angle), math.sin(angle))
+
+
+@compiled
+def path_at(arm, muscle, c, s):
+    """`path_geometry` at an angle of that cosine and sine.
 
     Only segments between forearm and ground change; the others are as long as in the frame of their points.
     """
     n, e = vec(arm.axis, 0), vec(arm.elbow, 0)
-    c, s = math.cos(angle), math.sin(angle)
     length, lever = 0.0, 0.0
     for k in range(arm.first[muscle] + 1, arm.first[muscle + 1]):
         a, b = row(arm.points, k - 1), row(arm.points, k)
@@ -243,8 +248,8 @@ def sweep(arm, interval, moment, lengths, levers, relaxation, tendon_force, acti
 def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, activations):
     """Fill moment [Nm], shape (n,), and activations [-], shape (n, 6).
 
-    Gives the largest shortage [Nm] and the largest change of an activation in the last iteration, at least `settled`
-    where the iteration did not end by itself.
+    Gives the largest shortage [Nm] and the error that is left in an activation, at least `settled` where the iteration
+    did not end by itself: changes fall by a rate r from one iteration to the next, and r / (1 - r) of the last is left.
 
     Args:
         arm: an ArmTable.
@@ -253,7 +258,7 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         course: psi, its rate and its acceleration, shape (n, 3).
         sweeps: largest number of iterations.
         relaxation: share of a new tendon force that an iteration takes over; the first takes all.
-        settled: change of every activation that ends the iteration.
+        settled: error left in an activation that ends the iteration.
         moment: filled.
         activations: filled.
     """
@@ -262,19 +267,24 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
     work, moments, fibre = np.zeros((2, n, m)), np.zeros((2, m)), np.zeros(n)
     needed_moments(arm, load, course, moment)
     for k in range(n):
+        c, s = math.cos(course[k, 0]), math.sin(course[k, 0])
         for i in range(m):
-            lengths[k, i], levers[k, i] = path_geometry(arm, i, course[k, 0])
+            lengths[k, i], levers[k, i] = path_at(arm, i, c, s)
             activations[k, i] = MINIMUM
-    change, shortage = math.inf, 0.0
+    before, left, shortage = math.inf, math.inf, 0.0
     for k in range(sweeps):
         forces(arm, interval, lengths, tendon_force, activations, fibre, work[0], work[1])
         change, shortage = sweep(
             arm, interval, moment, lengths, levers, relaxation if k > 0 else 1.0, tendon_force, activations, work,
             moments,
         )  # fmt: skip
-        if change < settled:
+        # A tendon force that nothing answers to comes nearer at 1 - relaxation.
+        rate = max(change / before, 1.0 - relaxation) if k > 0 else 0.5
+        left = change * rate / (1.0 - rate) if rate < 1.0 else math.inf
+        if left < settled:
             break
-    return shortage, change
+        before = change
+    return shortage, left
 
 
 @compiled

@@ -42,7 +42,7 @@ RELAXATION = 0.3
 """Share of the new tendon force that an iteration takes over (all of it in the first): a soft tendon answers to force
 more than one to one, and from 0.4 on neighbours in time, 0.02 s apart, excite each other through the velocity."""
 SETTLED = 1e-4
-"""Change of every activation below which the iteration has settled [-]."""
+"""Error left in an activation below which the iteration has settled [-]."""
 
 
 @dataclass(frozen=True)
@@ -154,19 +154,19 @@ def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> 
         SimulationError: the iteration between tendon strain and activation does not settle.
     """
     moment, activations = np.zeros(len(times)), np.zeros((len(times), len(MUSCLES)))
-    shortage, change = planned(
+    shortage, left = planned(
         model.arm, model.load, float(times[1] - times[0]), np.ascontiguousarray(course, dtype=float),
         SWEEPS, RELAXATION, SETTLED, moment, activations,
     )  # fmt: skip
-    if not change < SETTLED:
-        raise unsettled(change, float(times[-1]))
+    if not left < SETTLED:
+        raise unsettled(left, float(times[-1]))
     return MotorCommand(times, activations, moment, shortage)
 
 
-def unsettled(change: float, duration: float) -> SimulationError:
+def unsettled(left: float, duration: float) -> SimulationError:
     """The error of a command that does not settle in a movement of that duration [s]."""
     return SimulationError(
         f"the motor command does not settle: after {SWEEPS} iterations between tendon strain and activation an "
-        f"activation still changes by {change:.3g}; below {SETTLED:g} is wanted. Check the person's muscles and "
+        f"activation may still be wrong by {left:.3g}; below {SETTLED:g} is wanted. Check the person's muscles and "
         f"the movement of {duration:.4g} s."
     )

@@ -28,7 +28,7 @@ from exo_env.exoskeleton import link_moment, rope_lever
 from exo_env.fitting import MONOMIALS, put_monomials
 from exo_env.gym_machine import out_of_reach
 from exo_env.jit import compiled
-from exo_env.motor_command import RELAXATION, SETTLED, SWEEPS
+from exo_env.motor_command import SETTLED, SWEEPS
 from exo_env.need import put_lacking
 from exo_env.observations import OF_PATIENT, PREVIEW, TRUTH
 from exo_env.patient import FIELDS, PATIENT
@@ -37,6 +37,8 @@ from exo_env.start_kernel import Hardware, Places, put_start
 
 STILL, BESIDE = 1e-9, 2
 """Rate of the reference below which it rests [rad/s]; samples planned on either side of a movement."""
+RELAXATION = 0.6
+"""As in motor_command.py: samples PLANNING apart (rig.py) do not excite each other."""
 FIRST_STEP = 0.5
 """First step tried in an episode, over the control period: inputs leave rest along straight lines of that length."""
 CLOSED = 1e-10
@@ -71,8 +73,8 @@ class Found(NamedTuple):
 
     ability: int = 0
     """See need.py [-]."""
-    change: int = 1
-    """Of an activation in the last iteration of the command [-]."""
+    left: int = 1
+    """Error left in an activation of the command [-]."""
     gap: int = 2
     """Largest |phi| at the start [m or -]."""
 
@@ -203,7 +205,7 @@ def put_course(p, s):
 
 @compiled
 def put_command(p, s, arm, load):
-    """What the patient wants at each control time; gives the last change of an activation in the iteration.
+    """What the patient wants at each control time; gives the error left in an activation.
 
     What rests for long is planned once.
     """
@@ -225,9 +227,9 @@ def put_command(p, s, arm, load):
             count += 1
         row[k] = max(count - 1, 0)
     moment, activations = np.empty(count), np.empty((count, N))
-    _, change = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION, SETTLED, moment, activations)
+    _, left = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION, SETTLED, moment, activations)
     drawn(activations, row, times[1], floats(p, PLANT.period)[0], matrix(p, PLANT.wanted))
-    return change
+    return left
 
 
 @compiled
@@ -308,9 +310,9 @@ def open_episode(p, s):
     if not out_of_reach(reach, room, vec(arm.elbow, 0), vec(load.pulley, 0)):
         return OUT_OF_REACH
     put_course(p, s)
-    change = put_command(p, s, arm, load_of(s, floats(s, SETTING.patient)[EXPECTED] * weight))
-    floats(s, SETTING.found)[FOUND.change] = change
-    if not change < SETTLED:
+    left = put_command(p, s, arm, load_of(s, floats(s, SETTING.patient)[EXPECTED] * weight))
+    floats(s, SETTING.found)[FOUND.left] = left
+    if not left < SETTLED:
         return UNSETTLED
     put_patient(p, s, arm, load, activations)
     put_inputs(p, s, arm, load, activations)

@@ -168,7 +168,7 @@ class Rig:
         if code == OUT_OF_REACH:
             check_reach(self.machine, setting.elbow, setting.forearm[5:])
         if code == UNSETTLED:
-            raise unsettled(float(found[FOUND.change]), float(self.times[-1]))
+            raise unsettled(float(found[FOUND.left]), float(self.times[-1]))
         if code == NO_RATES:
             raise SimulationError(f"{Result.RATES_FAILED.value} (at the start of an episode)")
         if code == GAPING:

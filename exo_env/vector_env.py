@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any
 
 import gymnasium
@@ -18,6 +19,8 @@ from exo_env.events import NOTHING, SOLVER
 from exo_env.lift_env import ElbowLiftEnv
 from exo_env.rewards import TERMS
 
+EPISODE = attrgetter("_episode")
+"""Of an environment, None where there is none: cheaper than the property, which raises."""
 AT = {name: k for k, name in enumerate(NUMBERS)}
 
 
@@ -142,9 +145,9 @@ class ElbowLiftVectorEnv(VectorEnv):
         used = self._checked(actions)
         if not self._started or (self.autoreset_mode == AutoresetMode.DISABLED and self._over.any()):
             raise gymnasium.error.ResetNeeded("An episode is over, or none has begun; call reset() first.")
-        for i, env in enumerate(self.envs):
-            if env.episode is not self._episodes[i]:
-                raise gymnasium.error.ResetNeeded(f"World {i} was reset by itself; call reset() of the batch.")
+        if list(map(EPISODE, self.envs)) != self._episodes:
+            i = [a is b for a, b in zip(map(EPISODE, self.envs), self._episodes, strict=True)].index(False)
+            raise gymnasium.error.ResetNeeded(f"World {i} was reset by itself; call reset() of the batch.")
         running = ~self._over
         which = np.flatnonzero(running)
         for i in self._batch.run(which, used):
