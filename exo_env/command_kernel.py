@@ -266,6 +266,8 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
     lengths, levers, tendon_force = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m))
     work, moments, fibre = np.zeros((2, n, m)), np.zeros((2, m)), np.zeros(n)
     needed_moments(arm, load, course, moment)
+    if not np.abs(moment).sum() < math.inf:
+        return math.inf, math.inf
     for k in range(n):
         c, s = math.cos(course[k, 0]), math.sin(course[k, 0])
         for i in range(m):

@@ -21,14 +21,13 @@ from exo_env.actions import checked_action, drive
 from exo_env.control_period import READING, STATUS, Plant, finish, run_period
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
-from exo_env.events import NOTHING, SOLVER, Limits, event
+from exo_env.events import NOTHING, Limits
 from exo_env.lift_settings import SOLVER_OPTIONS, TIME, load_distribution, within, worn_device
 from exo_env.observations import Observer, Slice
-from exo_env.patient import fields_of
 from exo_env.population import Source, population
 from exo_env.readout import Readout
-from exo_env.repetition import MOST_REPETITIONS, MOVED, MOVEMENT, Repetitions
-from exo_env.rewards import TERMS, Weights
+from exo_env.repetition import MOST_REPETITIONS, MOVEMENT, Repetitions
+from exo_env.rewards import Weights
 from exo_env.rig import Rig
 from exo_env.scene import Scene
 
@@ -307,7 +306,8 @@ class ElbowLiftEnv(gymnasium.Env):
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
-        return plant.observation.astype(np.float32), float(plant.reward[0]), terminated, truncated, self._info()
+        info = self._readout.info(self._weights, self.happened())
+        return plant.observation.astype(np.float32), float(plant.reward[0]), terminated, truncated, info
 
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may want another order of elimination."""
@@ -324,12 +324,7 @@ class ElbowLiftEnv(gymnasium.Env):
 
     def happened(self) -> str | None:
         """The sentence on what ended the episode, or None."""
-        code, r = self._plant.status[STATUS.event], self._readout
-        if code == NOTHING:
-            return None
-        if code == SOLVER:
-            return f"{self.episode.world.result.value} Stopped at t = {self.episode.world.time:.6g} s."
-        return event(int(code), self.limits, r.angle, float(max(r.tensions)), r[READING.reaction])
+        return self._readout.happened(self.limits)
 
     def readings(self) -> dict[str, float]:
         """Everything of the paper's figures 9 to 13 at the present time, without noise: every sensor of the model.
@@ -346,31 +341,7 @@ class ElbowLiftEnv(gymnasium.Env):
 
     def start_info(self) -> dict[str, Any]:
         """What the episode is made of."""
-        e = self.episode
-        return {
-            "patient": fields_of(e.who.tolist()),
-            "load": e.load,
-            "ability": e.need.ability,
-            "reference": dict(zip(MOVED, e.movement.tolist(), strict=False)),
-            "initial_angle_deg": math.degrees(self._readout.angle),
-        }
-
-    def _info(self) -> dict[str, Any]:
-        """Of a step."""
-        plant, r, happened = self._plant, self._readout, self.happened()
-        info: dict[str, Any] = {
-            "reward_terms": dict(zip(TERMS, plant.terms.tolist(), strict=True)),
-            "reward_weights": self._weights.copy(),
-            "time": float(self.episode.times[plant.status[STATUS.step]]),
-            "tracking_error_deg": math.degrees(r.error),
-            "device_share": r[READING.share],
-            "effort": self.episode.effort,
-            "elbow_reaction": r[READING.reaction],
-            "solver_failed": bool(plant.status[STATUS.event] == SOLVER),
-        }
-        if happened is not None:
-            info["event"] = happened
-        return info
+        return self._readout.start_info()
 
     def scene(self) -> Scene:
         """What a picture shows of the present time."""

@@ -1,12 +1,19 @@
-"""True readings of an episode, by the names that observations, rewards and events use."""
+"""True readings of an episode, by the names that observations, rewards and events use, and what `info` tells."""
 
 from __future__ import annotations
+
+import math
+from typing import Any
 
 import numpy as np
 
 from exo_env.control_period import READING, STATUS, Plant
 from exo_env.episode import Episode
+from exo_env.events import NOTHING, SOLVER, Limits, event
 from exo_env.human import MUSCLES
+from exo_env.patient import fields_of
+from exo_env.repetition import MOVED
+from exo_env.rewards import TERMS
 
 
 class Readout:
@@ -60,3 +67,46 @@ class Readout:
         }  # fmt: skip
         found |= {name: float(x) for name, x in zip(e.drive.inputs, self.plant.commands, strict=True)}
         return found | {f"solver.{name}": float(x) for name, x in e.world.stats().as_dict().items()}
+
+    def happened(self, limits: Limits) -> str | None:
+        """The sentence on what ended the episode, or None."""
+        code = self.plant.status[STATUS.event]
+        if code == NOTHING:
+            return None
+        if code == SOLVER:
+            world = self.episode.world
+            return f"{world.result.value} Stopped at t = {world.time:.6g} s."
+        return event(int(code), limits, self.angle, float(max(self.tensions)), self[READING.reaction])
+
+    def start_info(self) -> dict[str, Any]:
+        """What the episode is made of."""
+        e = self.episode
+        return {
+            "patient": fields_of(e.who.tolist()),
+            "load": e.load,
+            "ability": e.need.ability,
+            "reference": dict(zip(MOVED, e.movement.tolist(), strict=False)),
+            "initial_angle_deg": math.degrees(self.angle),
+        }
+
+    def info(self, weights: dict[str, float], happened: str | None) -> dict[str, Any]:
+        """Of a step.
+
+        Args:
+            weights: of the reward.
+            happened: what ended the episode.
+        """
+        plant = self.plant
+        found: dict[str, Any] = {
+            "reward_terms": dict(zip(TERMS, plant.terms.tolist(), strict=True)),
+            "reward_weights": weights.copy(),
+            "time": float(self.episode.times[plant.status[STATUS.step]]),
+            "tracking_error_deg": math.degrees(self.error),
+            "device_share": self[READING.share],
+            "effort": self.episode.effort,
+            "elbow_reaction": self[READING.reaction],
+            "solver_failed": bool(plant.status[STATUS.event] == SOLVER),
+        }
+        if happened is not None:
+            found["event"] = happened
+        return found
