@@ -185,23 +185,22 @@ class Draws:
     """
 
     def __init__(self, spreads: Sequence[Distribution]) -> None:
-        self._spreads = tuple(spreads)
         rows = [_drawing(d) for d in spreads]
         self._kinds = np.array([kind for kind, _ in rows], np.int64)
         self._numbers = np.array([numbers for _, numbers in rows], dtype=float)
-        self._others = np.flatnonzero(self._kinds == OTHER).tolist()
-        self._normal = np.flatnonzero(self._kinds == NORMAL)
+        self._others = [(k, d) for k, d in enumerate(spreads) if rows[k][0] == OTHER]
+        self._normal = np.zeros(int((self._kinds == NORMAL).sum()))
 
     def sample(self, generator: np.random.Generator) -> np.ndarray:
         """One number of each, shape (n,), from as many uniform numbers in the same order."""
-        p = generator.random(len(self._spreads))
-        x = p.copy()
+        x = generator.random(len(self._kinds))
+        others = [(k, d.quantile(float(x[k]))) for k, d in self._others]
         if len(self._normal):
-            low, span = self._numbers[self._normal, 4], self._numbers[self._normal, 5]
-            x[self._normal] = ndtri(low + p[self._normal] * span)
-        _quantiles(self._kinds, self._numbers, x)
-        for k in self._others:
-            x[k] = self._spreads[k].quantile(float(p[k]))
+            _probabilities(self._kinds, self._numbers, x, self._normal)
+            ndtri(self._normal, out=self._normal)
+        _quantiles(self._kinds, self._numbers, self._normal, x)
+        for k, value in others:
+            x[k] = value
         return x
 
 
@@ -220,8 +219,19 @@ def _drawing(d: Distribution) -> tuple[int, tuple[float, ...]]:
 
 
 @compiled
-def _quantiles(kinds, numbers, x):
-    """Probabilities (of a normal distribution: its standard quantiles) in x become values."""
+def _probabilities(kinds, numbers, x, normal):
+    """Fill what the cut leaves of the probabilities of each normal distribution."""
+    i = 0
+    for k in range(x.shape[0]):
+        if kinds[k] == NORMAL:
+            normal[i] = numbers[k, 4] + x[k] * numbers[k, 5]
+            i += 1
+
+
+@compiled
+def _quantiles(kinds, numbers, normal, x):
+    """Probabilities in x become values; normal: standard quantiles of each normal distribution."""
+    i = 0
     for k in range(x.shape[0]):
         low, high = numbers[k, 0], numbers[k, 1]
         if kinds[k] == STRAIGHT:
@@ -229,4 +239,5 @@ def _quantiles(kinds, numbers, x):
         elif kinds[k] == LOGARITHMIC:
             x[k] = min(max(low * math.exp(x[k] * numbers[k, 2]), low), high)
         elif kinds[k] == NORMAL:
-            x[k] = min(max(numbers[k, 2] + numbers[k, 3] * x[k], low), high)
+            x[k] = min(max(numbers[k, 2] + numbers[k, 3] * normal[i], low), high)
+            i += 1

@@ -107,7 +107,7 @@ class Population(Settings):
     def draw(self, generator: np.random.Generator) -> np.ndarray:
         """As `sample`, a patient as `Patient.row` gives it; what is checked of a population holds for all of these."""
         if self.mixture:
-            chosen = weighted(tuple(self.mixture.values()), generator.random())
+            chosen = weighted(self._weights, generator.random())
             return self.parts[chosen].draw(generator)
         draws, places = self._draws
         row = np.empty(len(FIELDS))
@@ -115,6 +115,10 @@ class Population(Settings):
         if BODY_MASS_INDEX in self.distributions:
             row[FIELDS.index("body_mass")] *= row[FIELDS.index("height")] ** 2
         return row
+
+    @cached_property
+    def _weights(self) -> tuple[float, ...]:
+        return tuple(self.mixture.values())
 
     @cached_property
     def _draws(self) -> tuple[Draws, np.ndarray]:
