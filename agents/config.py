@@ -45,7 +45,7 @@ class Training(Settings):
         default=(), max_length=8, description="time constants of filtered observations beside each one [s], traces.py"
     )
     hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held, see hold.py")
-    start: tuple[float, float] | None = Field(
+    start: tuple[Component, Component] | None = Field(
         default=None, description="action of PPO's untrained policy, from which it learns to differ; None: 0 and 0"
     )
     against: tuple[Component, Component] | None = Field(

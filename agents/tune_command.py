@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import shlex
 import sys
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def tune_baselines(
     folder = (configs() / FILE).parent if out is None else out
     check_writable(folder / TRIES)
     command = f"python -m agents tune-baselines --tries {tries} --patients {patients} --seed {seed}"
-    command += f" --population {population}" if population != POPULATION else ""
+    command += f" --population {shlex.quote(population)}" if population != POPULATION else ""
     command += f" --repetitions {repetitions}" if repetitions > 1 else ""
     found: dict[str, list[Try]] = {}
     with tqdm(total=len(tunable()) * tries, unit="try", leave=False, disable=None, file=sys.stderr) as bar:

@@ -84,5 +84,6 @@ def test_a_pair_that_fell_out_of_step_begins_together_again(dropped):
 
 
 def test_an_action_that_cannot_be_is_refused():
-    with pytest.raises(InputError, match="against"):
-        Config.of(content(training={"against": [0.0, 1.5]}), "ppo")
+    for key in ("against", "start"):
+        with pytest.raises(InputError, match=key):
+            Config.of(content(training={key: [0.0, 1.5]}), "ppo")
