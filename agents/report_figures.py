@@ -19,6 +19,9 @@ CURVES = (
     ("device_work_share", "work of the device [-]"),
 )
 MARKERS = "osD^vP*X"
+PARETO = ("device_work_share", "tracking_rms_deg")
+FAR_OFF = 5.0
+"""Errors beyond so many times the middle one are not compared patient by patient."""
 
 
 @dataclass(frozen=True)
@@ -64,36 +67,66 @@ def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) ->
 
 
 def pareto(path: Path, results: Mapping[str, Any]) -> None:
-    """Tracking over the share of the work that the device does: low is good in both, and one costs the other."""
-    figure, axes = panels(1, 1, (6.4, 4.4))
-    (ax,) = axes.flat
-    for k, found in enumerate(results["policies"].values()):
-        x, y = (found["summary"][name] for name in ("device_work_share", "tracking_rms_deg"))
-        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
-        whiskers = [[[v["value"] - v["low"]], [v["high"] - v["value"]]] for v in (x, y)]
-        ax.errorbar(
-            x["value"], y["value"], xerr=whiskers[0], yerr=whiskers[1], color=colour, marker=marker, markersize=7,
-            linewidth=1.2, capsize=3, linestyle="", label=found["title"],
-        )  # fmt: skip
-    _front(ax, list(results["policies"].values()))
+    """Tracking over the share of the work that the device does: low is good in both, and one costs the other.
+
+    Beside it the same as differences to the first policy, patient by patient, of those that track nearly as well:
+    patients differ by more than policies do.
+    """
+    policies = list(results["policies"].values())
+    errors = [p["summary"][PARETO[1]]["value"] for p in policies]
+    near = [p for p, error in zip(policies, errors, strict=True) if error <= FAR_OFF * float(np.median(errors))]
+    compared = len(near) > 1 and policies[0] in near
+    figure, axes = panels(1, 1 + compared, (5.2 + 4.2 * compared, 4.4))
+    ax = axes.flat[0]
+    _points(ax, policies, policies, "summary")
+    _front(ax, policies)
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter("{x:g}")
     ax.grid(True, which="minor", axis="y", color="0.94", linewidth=0.4)
     ax.set_xlabel("share of the device in the positive work [-]")
     ax.set_ylabel("tracking error, rms [deg]")
+    ax.set_title("interquartile means; low is good in both, dotted: beaten by none", fontsize=9)
+    if compared:
+        other = axes.flat[1]
+        _points(other, near, policies, "difference")
+        other.set_xlabel("share of the device: difference [-]")
+        other.set_ylabel("tracking error, rms: difference [deg]")
+        other.set_title(f"mean difference to {policies[0]['title']}, patient by patient", fontsize=9)
     percent = 100.0 * results["confidence"]
-    ax.set_title(
-        f"{results['patients']} patients, {results['population']}\ninterquartile mean, {percent:g} % interval; "
-        "low is good in both, dotted: beaten by none",
-        fontsize=9,
-    )
+    figure.supxlabel(f"{results['patients']} patients, {results['population']}; {percent:g} % intervals", fontsize=9)
     legend(figure, ax, 3)
     save(figure, path)
 
 
+def _points(ax: Any, shown: Sequence[Mapping[str, Any]], policies: Sequence[Mapping[str, Any]], kind: str) -> None:
+    """A point with whiskers a policy; trainings that are shown together are dots of that colour without whiskers."""
+    x, y = PARETO
+    alone = [p for p in policies if _pool(p, policies) is None]
+    for p in shown:
+        one, other = p[kind][x], p[kind][y]
+        pool = _pool(p, policies)
+        k = alone.index(pool or p)
+        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
+        if pool is not None:
+            ax.plot(one["value"], other["value"], ".", color=colour, markersize=4, zorder=3)
+            continue
+        whiskers = [[[v["value"] - v["low"]], [v["high"] - v["value"]]] for v in (one, other)]
+        ax.errorbar(
+            one["value"], other["value"], xerr=whiskers[0], yerr=whiskers[1], color=colour, marker=marker, markersize=6,
+            linewidth=1.2, capsize=3, linestyle="", label=p["title"], alpha=0.8,
+        )  # fmt: skip
+
+
+def _pool(policy: Mapping[str, Any], policies: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The trainings with which a policy is shown together, or None."""
+    name, seeded, _ = policy["title"].rpartition(", seed ")
+    pools = [p for p in policies if "trainings" in p and p["title"].startswith(f"{name}, ")]
+    return pools[0] if seeded and pools else None
+
+
 def _front(ax: Any, policies: Sequence[Mapping[str, Any]]) -> None:
     """A line along the policies that none other beats in both."""
-    points = [[p["summary"][name]["value"] for name in ("device_work_share", "tracking_rms_deg")] for p in policies]
+    points = [[p["summary"][name]["value"] for name in PARETO] for p in policies]
     best = sorted(p for p in points if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points))
     ax.step(*zip(*best, strict=True), where="post", color="0.7", linewidth=1.0, linestyle=":", zorder=0)
 
