@@ -47,7 +47,7 @@ $(ALL_STAMP): $(TRAIN_STAMP)
 
 demo: $(STAMP)
 	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
-	$(BIN)/python -m agents evaluate --policy none pid pid_yielding pid_compensated assist_as_needed learned \
+	$(BIN)/python -m agents evaluate --policy pid none pid_yielding pid_compensated assist_as_needed learned \
 	    --patients 20 --repetitions 3 --out $(OUT)/evaluation
 	$(BIN)/python -m agents report $(OUT)/evaluation --policies pid learned --out $(OUT)/report
 	$(BIN)/python -m agents video --policy pid learned --patient stroke_severe --out $(OUT)/assist.mp4
