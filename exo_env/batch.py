@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import partial
 from typing import Any
 
@@ -111,7 +111,10 @@ class Batch:
         if self.worlds[i] != (world, setting):
             self.worlds[i], self._areas[i] = (world, setting), areas_of(world, BESIDE)
             self._addresses[i], self._settings[i] = world.table.ctypes.data, setting.table.ctypes.data
-        collect(world.table, self.observations[i], self.numbers[i], self.status[i])
+
+    def take(self, i: int) -> None:
+        """Collect what world i tells, where it was moved by other hands."""
+        collect(table_at(self._addresses[i], FIELDS), self.observations[i], self.numbers[i], self.status[i])
 
     def open(self, which: np.ndarray) -> np.ndarray:
         """Open the episodes of the worlds `which`, shape (k,), as their settings say; gives what came of each."""
@@ -136,13 +139,13 @@ class Batch:
 
     def _share(self, count: int, work: Callable, *arguments: Any) -> None:
         """Do `count` pieces of work on all threads; its last argument counts those that are taken."""
-        share = partial(work, *arguments, np.zeros(1, np.int64))
-        jobs = [self._pool.submit(share) for _ in range(min(self.threads, count) - 1)] if self._pool else []
+        share, jobs = partial(work, *arguments, np.zeros(1, np.int64)), list[Future]()
         try:
+            if self._pool:
+                jobs += [self._pool.submit(share) for _ in range(min(self.threads, count) - 1)]
             share()
         finally:
-            # An interrupt must not leave threads behind that still write.
-            wait(jobs)
+            _wait(jobs)
         for job in jobs:
             job.result()
 
@@ -151,6 +154,19 @@ class Batch:
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
+
+
+def _wait(jobs: list[Future]) -> None:
+    """Wait to the end: an interrupt must not leave threads behind that still write."""
+    interrupt = None
+    while True:
+        try:
+            wait(jobs)
+            break
+        except KeyboardInterrupt as error:
+            interrupt = error
+    if interrupt is not None:
+        raise interrupt
 
 
 def _cores() -> int:

@@ -68,7 +68,7 @@ def areas_of(packed: Packed, beside: Collection[str]) -> np.ndarray:
     merged: list[list[int]] = []
     for first, size in sorted(_arrays(packed, beside)):
         if merged and first - sum(merged[-1]) < GAP:
-            merged[-1][1] = first + size - merged[-1][0]
+            merged[-1][1] = max(merged[-1][1], first + size - merged[-1][0])
         else:
             merged.append([first, size])
     found = np.zeros((AREAS, 2), np.int64)

@@ -248,8 +248,8 @@ def sweep(arm, interval, moment, lengths, levers, relaxation, tendon_force, acti
 def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, activations):
     """Fill moment [Nm], shape (n,), and activations [-], shape (n, 6).
 
-    Gives the largest shortage [Nm] and the error that is left in an activation, at least `settled` where the iteration
-    did not end by itself: changes fall by a rate r from one iteration to the next, and r / (1 - r) of the last is left.
+    Gives the largest shortage [Nm] and the estimated error in an activation, at least `settled` where the iteration did
+    not end by itself: changes fall by a rate r from one iteration to the next, and r / (1 - r) of the last is left.
 
     Args:
         arm: an ArmTable.
@@ -258,7 +258,7 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         course: psi, its rate and its acceleration, shape (n, 3).
         sweeps: largest number of iterations.
         relaxation: share of a new tendon force that an iteration takes over; the first takes all.
-        settled: error left in an activation that ends the iteration.
+        settled: estimated error in an activation that ends the iteration.
         moment: filled.
         activations: filled.
     """
@@ -266,8 +266,6 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
     lengths, levers, tendon_force = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m))
     work, moments, fibre = np.zeros((2, n, m)), np.zeros((2, m)), np.zeros(n)
     needed_moments(arm, load, course, moment)
-    if not np.abs(moment).sum() < math.inf:
-        return math.inf, math.inf
     for k in range(n):
         c, s = math.cos(course[k, 0]), math.sin(course[k, 0])
         for i in range(m):
@@ -286,7 +284,8 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
         if left < settled:
             break
         before = change
-    return shortage, left
+    # Largest values do not see a number that is none; sums do.
+    return (shortage, left) if np.abs(moment).sum() + activations.sum() < math.inf else (math.inf, math.inf)
 
 
 @compiled

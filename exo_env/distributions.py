@@ -134,8 +134,9 @@ class Choice(Settings):
         return self
 
     def limits(self) -> tuple[Value, ...]:
-        """Every value."""
-        return self.choice
+        """Every value; numbers in rising order."""
+        numbers = [x for x in self.choice if not isinstance(x, str)]
+        return tuple(sorted(numbers)) if len(numbers) == len(self.choice) else self.choice
 
     def quantile(self, p: float) -> Value:
         """Value at a probability."""
@@ -189,16 +190,17 @@ class Draws:
         self._kinds = np.array([kind for kind, _ in rows], np.int64)
         self._numbers = np.array([numbers for _, numbers in rows], dtype=float)
         self._others = [(k, d) for k, d in enumerate(spreads) if rows[k][0] == OTHER]
-        self._normal = np.zeros(int((self._kinds == NORMAL).sum()))
+        self._normal = int((self._kinds == NORMAL).sum())
 
     def sample(self, generator: np.random.Generator) -> np.ndarray:
         """One number of each, shape (n,), from as many uniform numbers in the same order."""
         x = generator.random(len(self._kinds))
         others = [(k, d.quantile(float(x[k]))) for k, d in self._others]
-        if len(self._normal):
-            _probabilities(self._kinds, self._numbers, x, self._normal)
-            ndtri(self._normal, out=self._normal)
-        _quantiles(self._kinds, self._numbers, self._normal, x)
+        normal = np.empty(self._normal)
+        if self._normal:
+            _probabilities(self._kinds, self._numbers, x, normal)
+            ndtri(normal, out=normal)
+        _quantiles(self._kinds, self._numbers, normal, x)
         for k, value in others:
             x[k] = value
         return x

@@ -31,10 +31,11 @@ class Episode:
         load: weight on the machine [kg].
         movement: the repetition as a row of numbers in the order of MOVEMENT.
         need: of the patient on this movement.
+        start: elbow angle at its start [rad].
     """
 
-    def __init__(self, rig: Rig, who: np.ndarray, load: float, movement: np.ndarray, need: Need) -> None:
-        self.rig, self.who, self.load, self.movement, self.need = rig, who, load, movement, need
+    def __init__(self, rig: Rig, who: np.ndarray, load: float, movement: np.ndarray, need: Need, start: float) -> None:
+        self.rig, self.who, self.load, self.movement, self.need, self.start = rig, who, load, movement, need, start
         self.course = rig.plant.course.copy()
         """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at the control times, shape (n, 3)."""
 

@@ -12,6 +12,7 @@ length of the gym rope and the start of what moves are not linear; start_kernel.
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -135,7 +136,7 @@ class Fitting:
 
     def __init__(self, ecosystem: Ecosystem, mode: str, drive: Drive) -> None:
         self.ecosystem, self.mode, self.drive = ecosystem, mode, drive
-        self._known: set[str] = set()
+        self._known, self._lock = set[str](), Lock()
         self._parts: list[tuple[int, int, tuple[int, ...]]] = []
         self.both = np.zeros((0, MONOMIALS))
         """C of men, then of women, as far as they were asked for, shape (2 n, MONOMIALS)."""
@@ -153,12 +154,13 @@ class Fitting:
 
     def coefficients(self, sex: Sex) -> np.ndarray:
         """C, shape (n, MONOMIALS)."""
-        if sex not in self._known:
-            C = self._found(sex)
-            if not self._known:
-                self.both = np.zeros((len(SEXES) * len(C), MONOMIALS))
-            self.both[SEXES.index(sex) * len(C) :][: len(C)] = C
-            self._known.add(sex)
+        with self._lock:
+            if sex not in self._known:
+                C = self._found(sex)
+                if not self._known:
+                    self.both = np.zeros((len(SEXES) * len(C), MONOMIALS))
+                self.both[SEXES.index(sex) * len(C) :][: len(C)] = C
+                self._known.add(sex)
         n = len(self.both) // len(SEXES)
         return self.both[SEXES.index(sex) * n :][:n]
 

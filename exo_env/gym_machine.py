@@ -44,14 +44,17 @@ class GymMachine(Settings):
 
 
 @compiled
-def out_of_reach(reach, room, elbow, low_pulley):
-    """Whether the rope's ends stay off the pulleys.
+def clearances(elbow, grip, handle_length, low_pulley, room):
+    """What is left between the ends of the rope and the pulleys, above 0 where they cannot meet [m].
 
-    The handle's end goes as far as `reach` [m] from the elbow; the weight begins `room` [m] below the high pulley, and
-    can rise by twice that reach.
+    The handle's end goes as far as grip and handle reach from the elbow; the weight, which begins `room` [m] below the
+    high pulley, can rise by twice that.
+
+    Returns:
+        (at the low pulley, at the high one, the reach)
     """
-    d = sub(low_pulley, elbow)
-    return room > 2.0 * reach and dot(d, d) > reach * reach
+    d, reach = sub(low_pulley, elbow), math.sqrt(dot(grip, grip)) + handle_length
+    return math.sqrt(dot(d, d)) - reach, room - 2.0 * reach, reach
 
 
 def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> None:
@@ -65,20 +68,27 @@ def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> Non
     Raises:
         InputError: an end of the rope could reach a pulley, and nothing stops the weight.
     """
-    # The rope's end is in a disc of twice this width.
-    reach = math.hypot(*grip) + machine.handle.length
-    room, from_low = machine.high_pulley[1] - machine.weight_start, math.dist(elbow, machine.low_pulley)
-    if out_of_reach(reach, room, tuple(elbow), machine.low_pulley):
-        return
-    if room <= 2.0 * reach:
-        raise InputError(
-            f"high_pulley = {machine.high_pulley} is {room:.4g} m above weight_start = {machine.weight_start}; the "
-            f"weight can rise by {2.0 * reach:.4g} m, and the pulley must be higher."
+    if min(_clearances(machine, elbow, grip)[:2]) <= 0.0:
+        raise reach_error(machine, elbow, grip)
+
+
+def reach_error(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> InputError:
+    """What `check_reach` raises, about the pulley that is nearer to being reached."""
+    low, high, reach = _clearances(machine, elbow, grip)
+    if high < low:
+        return InputError(
+            f"high_pulley = {machine.high_pulley} is {high + 2.0 * reach:.4g} m above weight_start = "
+            f"{machine.weight_start}; the weight can rise by {2.0 * reach:.4g} m, and the pulley must be higher."
         )
-    raise InputError(
-        f"low_pulley = {machine.low_pulley} is {from_low:.4g} m from the elbow, and the handle reaches "
+    return InputError(
+        f"low_pulley = {machine.low_pulley} is {low + reach:.4g} m from the elbow, and the handle reaches "
         f"{reach:.4g} m; it must be out of reach."
     )
+
+
+def _clearances(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> tuple[float, float, float]:
+    room = machine.high_pulley[1] - machine.weight_start
+    return clearances(tuple(elbow), tuple(grip), machine.handle.length, machine.low_pulley, room)
 
 
 class LoadedMachine:

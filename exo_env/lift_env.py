@@ -222,6 +222,9 @@ class ElbowLiftEnv(gymnasium.Env):
         """First part of a reset: draw an episode. The second opens it in compiled code, the third is `opened`."""
         super().reset(seed=seed)
         self._over, self._episode = True, None
+        for name in options or {}:
+            if name not in OPTIONS:
+                raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
         self.rig.prepare(*self._drawn(options or {}), self.np_random)
 
     def opened(self, code: int) -> None:
@@ -241,9 +244,6 @@ class ElbowLiftEnv(gymnasium.Env):
         seed = int(self.np_random.integers(2**63))
         start_deg = movement[MOVEMENT.start_deg]
         if options:
-            for name in options:
-                if name not in OPTIONS:
-                    raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
             fixed = np.random.default_rng(seed)
             if "patient" in options:
                 patient = population(options["patient"]).draw(fixed)
@@ -300,6 +300,8 @@ class ElbowLiftEnv(gymnasium.Env):
         if self._over:
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
         plant, status = self._plant, self._plant.status
+        # Until the period is done to its end: what breaks it off leaves nothing to step.
+        self._over = True
         if run_period(self.rig.packed.table, used) != DONE:
             self.rescue()
         terminated, truncated = bool(status[STATUS.event] != NOTHING), bool(status[STATUS.step] == status[STATUS.steps])
@@ -341,6 +343,7 @@ class ElbowLiftEnv(gymnasium.Env):
 
     def start_info(self) -> dict[str, Any]:
         """What the episode is made of."""
+        _ = self.episode
         return self._readout.start_info()
 
     def scene(self) -> Scene:

@@ -42,7 +42,7 @@ RELAXATION = 0.3
 """Share of the new tendon force that an iteration takes over (all of it in the first): a soft tendon answers to force
 more than one to one, and from 0.4 on neighbours in time, 0.02 s apart, excite each other through the velocity."""
 SETTLED = 1e-4
-"""Error left in an activation below which the iteration has settled [-]."""
+"""Estimated error in an activation below which the iteration has settled [-]."""
 
 
 @dataclass(frozen=True)
@@ -87,10 +87,6 @@ class InternalModel:
             expected_load: mass of the weight that it expects [kg].
         """
         return cls(arm_table(arm), load_table(arm, machine, expected_load))
-
-    def expecting(self, load: float) -> InternalModel:
-        """The same subject with another weight [kg] in mind."""
-        return InternalModel(self.arm, self.load._replace(weight=float(load)))
 
     def resting_moment(self, flexion: float) -> float:
         """Moment that must be given about the elbow to hold arm and load at rest [Nm]."""

@@ -26,7 +26,7 @@ from exo_env.control_period import PLANT, STATUS, begin, options_of
 from exo_env.effort import N, reset_effort, samples_in, start_excitation
 from exo_env.exoskeleton import link_moment, rope_lever
 from exo_env.fitting import MONOMIALS, put_monomials
-from exo_env.gym_machine import out_of_reach
+from exo_env.gym_machine import clearances
 from exo_env.jit import compiled
 from exo_env.motor_command import SETTLED, SWEEPS
 from exo_env.need import put_lacking
@@ -43,7 +43,7 @@ FIRST_STEP = 0.5
 """First step tried in an episode, over the control period: inputs leave rest along straight lines of that length."""
 CLOSED = 1e-10
 """Largest |phi| of a start [m or -], as in dms_core's assembly."""
-OPEN, OUT_OF_REACH, UNSETTLED, NO_RATES, GAPING = range(5)
+OPEN, PULLEY_IN_REACH, UNSETTLED, NO_RATES, GAPING = range(5)
 """What came of an opening: all went well; the rope's end could come to a pulley; the command did not settle; there are
 no accelerations; joints stay open."""
 PICKED = np.array([FIELDS.index(name) for name in PATIENT._fields])
@@ -74,7 +74,7 @@ class Found(NamedTuple):
     ability: int = 0
     """See need.py [-]."""
     left: int = 1
-    """Error left in an activation of the command [-]."""
+    """Estimated error in an activation of the command [-]."""
     gap: int = 2
     """Largest |phi| at the start [m or -]."""
 
@@ -205,7 +205,7 @@ def put_course(p, s):
 
 @compiled
 def put_command(p, s, arm, load):
-    """What the patient wants at each control time; gives the error left in an activation.
+    """What the patient wants at each control time; gives the estimated error in an activation.
 
     What rests for long is planned once.
     """
@@ -277,8 +277,8 @@ def put_inputs(p, s, arm, load, activations):
 
 @compiled
 def put_world(p, s, arm, load, activations):
-    """The world at rest at its start; gives what came of it."""
-    w, m, at = inner(p, PLANT.world), inner(p, PLANT.model), ints(s, SETTING.places)
+    """The world at rest at its start, without accelerations."""
+    at = ints(s, SETTING.places)
     hardware = Hardware(
         floats(s, SETTING.link), floats(s, SETTING.link_centre), floats(s, SETTING.handle),
         floats(s, SETTING.low_pulley), floats(s, SETTING.high_pulley), floats(s, SETTING.weight_height)[0],
@@ -290,13 +290,22 @@ def put_world(p, s, arm, load, activations):
     motors, commands = inner(s, SETTING.motors), floats(p, PLANT.commands)
     for k in range(motors.shape[0]):
         q[motors[k, 0]] = commands[motors[k, 1]]
-    rewind(w, q, v, FIRST_STEP * floats(p, PLANT.period)[0])
+    rewind(inner(p, PLANT.world), q, v, FIRST_STEP * floats(p, PLANT.period)[0])
+
+
+@compiled
+def settle(p, s):
+    """Accelerations and multipliers of a world at its start, and the first observation; gives what came of it."""
+    w, m = inner(p, PLANT.world), inner(p, PLANT.model)
     if not restart(m, w, options_of(p)):
         return NO_RATES
     run_part(m, w, CONSTRAINTS)
     gap = largest_errors(w)[0]
     floats(s, SETTING.found)[FOUND.gap] = gap
-    return OPEN if gap <= CLOSED else GAPING
+    if not gap <= CLOSED:
+        return GAPING
+    begin(p)
+    return OPEN
 
 
 @compiled(nogil=True)
@@ -305,10 +314,10 @@ def open_episode(p, s):
     put_numbers(s)
     weight = floats(s, SETTING.given)[GIVEN.weight]
     arm, load, activations = arm_of(s), load_of(s, weight), np.empty(N)
-    reach = math.sqrt(dot(vec(load.grip, 0), vec(load.grip, 0))) + floats(s, SETTING.handle)[1]
-    room = floats(s, SETTING.high_pulley)[1] - floats(s, SETTING.weight_height)[0]
-    if not out_of_reach(reach, room, vec(arm.elbow, 0), vec(load.pulley, 0)):
-        return OUT_OF_REACH
+    room, length = floats(s, SETTING.high_pulley)[1] - floats(s, SETTING.weight_height)[0], floats(s, SETTING.handle)[1]
+    low, high, _ = clearances(vec(arm.elbow, 0), vec(load.grip, 0), length, vec(load.pulley, 0), room)
+    if not (low > 0.0 and high > 0.0):
+        return PULLEY_IN_REACH
     put_course(p, s)
     left = put_command(p, s, arm, load_of(s, floats(s, SETTING.patient)[EXPECTED] * weight))
     floats(s, SETTING.found)[FOUND.left] = left
@@ -316,7 +325,5 @@ def open_episode(p, s):
         return UNSETTLED
     put_patient(p, s, arm, load, activations)
     put_inputs(p, s, arm, load, activations)
-    code = put_world(p, s, arm, load, activations)
-    if code == OPEN:
-        begin(p)
-    return code
+    put_world(p, s, arm, load, activations)
+    return settle(p, s)

@@ -16,18 +16,29 @@ from dms_core.errors import SimulationError
 from dms_core.results import Result
 from dms_core.simulation.dynamics import World
 from exo_env.actions import COMMANDS, Drive
-from exo_env.control_period import Plant
+from exo_env.control_period import READING, Plant
 from exo_env.ecosystem import REFERENCE, Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import Limits
 from exo_env.exoskeleton import AGONIST, ANTAGONIST, LOWER, PID, WornExoskeleton
 from exo_env.fitting import TEMPLATE_ANGLE, declared, fitting, template
-from exo_env.gym_machine import HANDLE, ROPE, WEIGHT, check_reach
+from exo_env.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
 from exo_env.human import MUSCLES, Arm, excitation_name
 from exo_env.motor_command import arm_table, load_table, unsettled
 from exo_env.need import Need
 from exo_env.observations import Observer
-from exo_env.opening import FOUND, GAPING, GIVEN, NO_RATES, OPEN, OUT_OF_REACH, UNSETTLED, Setting, open_episode
+from exo_env.opening import (
+    FOUND,
+    GAPING,
+    GIVEN,
+    NO_RATES,
+    OPEN,
+    PULLEY_IN_REACH,
+    UNSETTLED,
+    Setting,
+    open_episode,
+    settle,
+)
 from exo_env.patient import FIELDS, SEXES
 from exo_env.plant import plant_of
 from exo_env.repetition import MOVEMENT, Repetition
@@ -165,8 +176,12 @@ class Rig:
         """
         setting: Setting = self.setting.values
         found = setting.found
-        if code == OUT_OF_REACH:
-            check_reach(self.machine, setting.elbow, setting.forearm[5:])
+        if code == NO_RATES and self.world.reorder():
+            # The orders of elimination were chosen elsewhere; a straight elbow wants others.
+            self.follow_world()
+            code = settle(self.packed.table, self.setting.table)
+        if code == PULLEY_IN_REACH:
+            raise reach_error(self.machine, setting.elbow, setting.forearm[5:])
         if code == UNSETTLED:
             raise unsettled(float(found[FOUND.left]), float(self.times[-1]))
         if code == NO_RATES:
@@ -178,7 +193,10 @@ class Rig:
         assert code == OPEN
         self.world.result = Result.SUCCESS
         need = Need(float(found[FOUND.ability]), self.plant.lacking.copy(), float(self.plant.scale[0]))
-        return Episode(self, setting.patient.copy(), float(setting.given[GIVEN.weight]), setting.movement.copy(), need)
+        start = float(self.plant.reading[READING.angle])
+        return Episode(
+            self, setting.patient.copy(), float(setting.given[GIVEN.weight]), setting.movement.copy(), need, start
+        )
 
 
 def _table_of(arrays: tuple[np.ndarray, ...]) -> np.ndarray:

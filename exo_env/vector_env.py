@@ -17,6 +17,7 @@ from exo_env.control_period import STATUS
 from exo_env.episode import Episode
 from exo_env.events import NOTHING, SOLVER
 from exo_env.lift_env import ElbowLiftEnv
+from exo_env.opening import OPEN
 from exo_env.rewards import TERMS
 
 EPISODE = attrgetter("_episode")
@@ -128,9 +129,16 @@ class ElbowLiftVectorEnv(VectorEnv):
             self._batch.put(i, env.packed, env.rig.setting)
         for i, code in zip(which.tolist(), self._batch.open(which).tolist(), strict=True):
             self.envs[i].opened(code)
+            if code != OPEN:
+                self._take_over(i)
             self._episodes[i], self._over[i] = self.envs[i].episode, False
             infos = self._add_info(infos, self.envs[i].start_info(), i)
         return infos
+
+    def _take_over(self, i: int) -> None:
+        """World i from its environment, which has ordered its equations anew."""
+        self._batch.put(i, self.envs[i].packed, self.envs[i].rig.setting)
+        self._batch.take(i)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """A control period of every world.
@@ -150,17 +158,21 @@ class ElbowLiftVectorEnv(VectorEnv):
             raise gymnasium.error.ResetNeeded(f"World {i} was reset by itself; call reset() of the batch.")
         running = ~self._over
         which = np.flatnonzero(running)
+        # Until the step is done to its end: what breaks it off leaves nothing to step.
+        self._started = False
         for i in self._batch.run(which, used):
             self.envs[i].rescue()
-            self._batch.put(i, self.envs[i].packed, self.envs[i].rig.setting)
+            self._take_over(i)
         status = self._batch.status
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
         terminated = running & (status[:, STATUS.event] != NOTHING)
         truncated = running & (status[:, STATUS.step] == status[:, STATUS.steps])
-        infos = self._begin(~running, self._infos(running) if running.any() else {})
-        self._over = terminated | truncated
+        infos = self._infos(running) if running.any() else {}
+        self._over = ~running | terminated | truncated
+        infos = self._begin(~running, infos)
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
             infos = self._same_step(self._over.copy(), infos)
+        self._started = True
         return self._batch.observations.copy(), rewards, terminated, truncated, infos
 
     def _checked(self, actions: Any) -> np.ndarray:

@@ -34,7 +34,6 @@ from dms_core.simulation.state import (
     Options,
     State,
     T,
-    rewind,
     with_tables,
 )
 
@@ -152,14 +151,6 @@ class World:
         self.state.counts[RESTART] = 1
         return True
 
-    def begin(self, q: np.ndarray, v: np.ndarray, step: float = 0.0) -> None:
-        """Back to t = 0 at another consistent start, shape (n_q,) each; inputs stay as they are.
-
-        `step` is tried first [s], where something is known of how the inputs will move; 0 takes a careful one.
-        """
-        rewind(self._world.table, np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), step)
-        self.result = Result.SUCCESS
-
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.
 
@@ -171,7 +162,7 @@ class World:
         try:
             code, stuck = self._advance(float(t_end), progress), -math.inf
             while code == step_control.MATRIX_SINGULAR:
-                if not (self._reorder() if self.time > stuck else self._shorten()):
+                if not (self.reorder() if self.time > stuck else self._shorten()):
                     break
                 stuck = self.time
                 code = self._advance(float(t_end), progress)
@@ -196,7 +187,7 @@ class World:
     def _keep(self, rows: np.ndarray) -> None:
         """What becomes of recorded steps: nothing here."""
 
-    def _reorder(self) -> bool:
+    def reorder(self) -> bool:
         """Choose rows and pivots anew where the old ones became singular; False if nothing helps."""
         s = self.state
         try:

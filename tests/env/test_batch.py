@@ -1,11 +1,16 @@
 """The compiled batch: every world is the single environment, whatever its neighbours, threads and resets."""
 
+import threading
+import time
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from dms_core.errors import InputError
+from dms_core.errors import InputError, SimulationError
+from exo_env import batch as batch_module
+from exo_env.batch import Batch
 from exo_env.lift_env import ElbowLiftEnv
 from exo_env.vector_env import ElbowLiftVectorEnv
 
@@ -163,3 +168,51 @@ def test_sb3_sees_terminal_observations_and_time_limits():
             np.testing.assert_array_equal(seen[k], observation)
     assert True in ends and False in ends
     worlds.close()
+
+
+def test_a_step_that_breaks_off_leaves_nothing_to_step(monkeypatch):
+    """A world that ends in the very step in which the opening of another fails must not go on past its last row."""
+    batch = ElbowLiftVectorEnv(2, episode_duration=0.1, threads=2)
+    batch.reset(seed=0)
+    batch.step(np.zeros((2, 2)))
+    # World 0 begins anew, and is now a step behind world 1.
+    batch.reset(seed=1, options={"reset_mask": np.array([False, True])})
+    for _ in range(4):
+        batch.step(np.zeros((2, 2)))
+    monkeypatch.setattr(batch.envs[0], "opened", lambda code: (_ for _ in ()).throw(SimulationError("broken")))
+    with pytest.raises(SimulationError, match="broken"):
+        batch.step(np.zeros((2, 2)))
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        batch.step(np.zeros((2, 2)))
+    with pytest.raises(gymnasium.error.ResetNeeded, match="all worlds"):
+        batch.reset(options={"reset_mask": np.array([True, False])})
+    monkeypatch.undo()
+    batch.reset(seed=0)
+    batch.step(np.zeros((2, 2)))
+    batch.close()
+
+
+def test_an_interrupt_waits_for_the_threads(monkeypatch):
+    """The caller is interrupted twice, in its own work and while it waits; no thread writes behind its back."""
+    batch, done = Batch(4, 12, threads=2), []
+
+    def slow(counter):
+        if threading.current_thread() is threading.main_thread():
+            time.sleep(0.05)
+            raise KeyboardInterrupt
+        time.sleep(0.3)
+        done.append(True)
+
+    calls, real = [], batch_module.wait
+
+    def interrupted(jobs):
+        calls.append(jobs)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return real(jobs)
+
+    monkeypatch.setattr(batch_module, "wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        batch._share(2, slow)
+    assert done == [True] and len(calls) == 2
+    batch.close()

@@ -2,11 +2,13 @@
 
 import math
 
+import gymnasium
 import numpy as np
 import pytest
 
 from dms_core.results import Result
 from dms_core.simulation.state import Options
+from exo_env import lift_env
 from exo_env.actions import RopeTension
 from exo_env.control_period import device_share
 from exo_env.lift_env import ElbowLiftEnv
@@ -345,3 +347,20 @@ def test_scene(env):
     assert 0.25 < forearm < 0.42
     # The weight hangs under the high pulley.
     assert scene.weight[0] == pytest.approx(scene.pulleys[1][0], abs=1e-9)
+
+
+def test_a_step_that_is_interrupted_ends_the_episode(monkeypatch):
+    env = ElbowLiftEnv()
+    env.reset(seed=0)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(lift_env, "run_period", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        env.step(np.zeros(2))
+    monkeypatch.undo()
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros(2))
+    env.reset(seed=0)
+    env.step(np.zeros(2))

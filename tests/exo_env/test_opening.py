@@ -2,22 +2,22 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
+import gymnasium
 import numpy as np
 import pytest
 
 from dms_core.errors import InputError, SimulationError
-from exo_env import opening
-from exo_env.claims import AREAS, areas_of, claim
-from exo_env.control_period import PLANT
+from exo_env.claims import areas_of, claim
 from exo_env.distributions import Draws, distribution
 from exo_env.jit import compiled
 from exo_env.lift_env import ElbowLiftEnv
 from exo_env.motor_command import SETTLED, InternalModel, plan_course
-from exo_env.opening import FOUND, GAPING, NO_RATES, OUT_OF_REACH, UNSETTLED
-from exo_env.patient import FIELDS, Patient
-from exo_env.population import population
+from exo_env.opening import FOUND, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED
+from exo_env.patient import FIELDS, Patient, fields_of
+from exo_env.population import Population, population
 from exo_env.repetition import Repetition, Repetitions, put_pieces
 from exo_env.rig import PLANNING
+from exo_env.vector_env import ElbowLiftVectorEnv
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,8 @@ def test_pieces_are_those_of_the_declared_signal(seed):
 
 SPECS = (
     1.25, {"uniform": [-1.0, 3.0]}, {"log_uniform": [0.01, 4.0]}, {"choice": [1.0, 2.0, 5.0], "weights": [1, 0, 3]},
-    {"normal": {"mean": 0.4, "deviation": 0.3, "low": 0.0, "high": 1.0}},
+    {"normal": {"mean": 0.4, "deviation": 0.3, "low": 0.0, "high": 1.0}}, {"uniform": [5.0, 6.0]},
+    {"normal": {"mean": 9.0, "deviation": 2.0, "low": 8.0, "high": 20.0}},
 )  # fmt: skip
 
 
@@ -56,6 +57,25 @@ def test_draws_are_the_quantiles_of_each_distribution():
         x = draws.sample(found)
         y = [d.quantile(wanted.random()) for d in spreads]
         np.testing.assert_allclose(x, y, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["stroke_mild", "evaluation"])
+def test_drawn_patients_are_the_quantiles_of_each_field(name):
+    found = population(name)
+    row, generator = found.draw(np.random.default_rng(2)), np.random.default_rng(2)
+    wanted = {field: d.quantile(generator.random()) for field, d in found.distributions.items()}
+    if "body_mass_index" in wanted:
+        wanted["body_mass"] = wanted.pop("body_mass_index") * wanted["height"] ** 2
+    for field, x in fields_of(row).items():
+        assert x == (wanted[field] if isinstance(x, str) else pytest.approx(wanted[field], rel=1e-14)), field
+
+
+def test_choices_are_checked_by_their_extremes_in_any_order():
+    with pytest.raises(InputError, match=r"lead to 130.0 deg; at most 100.0 deg"):
+        Repetitions(start_deg={"choice": [25.0, 60.0]}, amplitude_deg={"choice": [70.0, 30.0]})
+    given = {**population("stroke_mild").fields, "body_mass_index": {"choice": [25.0, 5.0, 26.0]}}
+    with pytest.raises(InputError, match="body_mass_index reaches 5.0"):
+        Population(fields=given)
 
 
 def test_rows_give_patients_and_movements_back():
@@ -81,7 +101,6 @@ def test_the_command_is_that_of_the_internal_model(env):
     ("code", "error", "sentence"),
     [
         (UNSETTLED, SimulationError, "motor command does not settle: .* may still be wrong by 0.5; below 0.0001"),
-        (NO_RATES, SimulationError, r"\(at the start of an episode\)"),
         (GAPING, SimulationError, "joints stay open by 0.25"),
     ],
 )
@@ -90,6 +109,48 @@ def test_an_opening_that_fails_says_why(env, code, error, sentence):
     found[FOUND.left], found[FOUND.gap] = 0.5, 0.25
     with pytest.raises(error, match=sentence):
         env.rig.opened(code)
+
+
+def test_without_accelerations_there_is_no_episode(env, monkeypatch):
+    monkeypatch.setattr(type(env.rig.world), "reorder", lambda self: False)
+    with pytest.raises(SimulationError, match=r"\(at the start of an episode\)"):
+        env.rig.opened(NO_RATES)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_straight_elbow_wants_other_orders_of_elimination(seed):
+    """At 0 deg, where those of the template have a pivot of rounding, alone as in a batch."""
+    settings, options = {"patient": "mixed"}, {"initial_angle_deg": 0.0}
+    env, batch = ElbowLiftEnv(**settings), ElbowLiftVectorEnv(2, threads=2, **settings)
+    observation, info = env.reset(seed=seed, options=options)
+    assert info["initial_angle_deg"] == pytest.approx(0.0, abs=1e-9)
+    observations, _ = batch.reset(seed=[9, seed], options=options)
+    np.testing.assert_array_equal(observations[1], observation)
+    action = np.array([-0.4, -1.0])
+    for _ in range(3):
+        observation, *_ = env.step(action)
+        observations, *_ = batch.step(np.array([action, action]))
+    np.testing.assert_array_equal(observations[1], observation)
+    batch.close()
+
+
+def test_what_an_episode_began_with_is_told_later_too(env):
+    _, told = env.reset(seed=5)
+    for _ in range(30):
+        env.step(np.array([1.0, -1.0]))
+    assert env.start_info() == told
+    env.reset(seed=5)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        ElbowLiftEnv().start_info()
+
+
+def test_an_unknown_option_draws_nothing(env):
+    env.reset(seed=3)
+    wanted = env.reset()[1]
+    env.reset(seed=3)
+    with pytest.raises(InputError, match="'typo' is unknown"):
+        env.reset(options={"typo": 1})
+    assert env.reset()[1] == wanted
 
 
 def test_a_pulley_within_reach_is_refused():
@@ -101,7 +162,7 @@ def test_a_pulley_within_reach_is_refused():
     rig.machine, setting.low_pulley[:] = rig.machine.changed(low_pulley=near), near
     env.prepare(0)
     code = rig.open()
-    assert code == OUT_OF_REACH
+    assert code == PULLEY_IN_REACH
     with pytest.raises(InputError, match="low_pulley = .* from the elbow, and the handle reaches"):
         env.opened(code)
 
@@ -131,6 +192,18 @@ def test_a_number_that_is_none_stops_an_opening(env):
     env.reset(seed=5)
 
 
+@pytest.mark.parametrize("table", ["muscles", "points"])
+def test_a_command_of_numbers_that_are_none_does_not_settle(env, table):
+    known = InternalModel.of(env.episode.arm, env.rig.machine, 1.0)
+    numbers = getattr(known.arm, table).copy()
+    numbers[1, 0] = np.nan
+    times = np.arange(20) * PLANNING
+    with pytest.raises(SimulationError, match="does not settle"):
+        plan_course(
+            InternalModel(known.arm._replace(**{table: numbers}), known.load), times, Repetition().course(times)
+        )
+
+
 @compiled(nogil=True)
 def _claims(counter, taken, n):
     for _ in range(n):
@@ -149,7 +222,6 @@ def test_no_two_threads_claim_the_same():
 
 def test_areas_hold_every_array_but_those_left_out(env):
     areas = areas_of(env.packed, ("noise",))
-    assert areas.shape == (AREAS, 2)
     plant = env.rig.plant
 
     def within(x):
@@ -158,4 +230,3 @@ def test_areas_hold_every_array_but_those_left_out(env):
 
     assert within(plant.effort) and within(env.rig.world.state.newton_values) and within(plant.wanted)
     assert not within(plant.noise)
-    assert PLANT._fields == type(plant)._fields and opening.SETTING._fields == type(env.rig.setting.values)._fields
