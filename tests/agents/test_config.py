@@ -13,7 +13,7 @@ from dms_core.config_files import configs
 from dms_core.errors import InputError
 from tests.agents.tiny import config_file, content
 
-SHIPPED = sorted((configs() / "agents").glob("*.yml"))
+SHIPPED = sorted((configs() / "agents").rglob("*.yml"))
 
 
 def refused(said, algorithm="ppo", overrides=(), **changes):
