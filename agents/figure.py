@@ -11,7 +11,7 @@ from agents.measures import MEASURES
 from exo_env.panels import panels, save
 
 COLUMNS = 3
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Distinct for colour-blind readers (Okabe and Ito 2008)."""
 
 

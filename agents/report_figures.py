@@ -20,7 +20,7 @@ CURVES = (
 )
 MARKERS = "osD^vP*X"
 PARETO = ("device_work_share", "tracking_rms_deg")
-FAR_OFF = 5.0
+FAR_OFF = 1.5
 """Errors beyond so many times the middle one are not compared patient by patient."""
 
 
@@ -82,6 +82,7 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
     _front(ax, policies)
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter("{x:g}" if max(errors) < 10.0 * min(errors) else "")
     ax.grid(True, which="minor", axis="y", color="0.94", linewidth=0.4)
     ax.set_xlabel("share of the device in the positive work [-]")
     ax.set_ylabel("tracking error, rms [deg]")
@@ -89,6 +90,7 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
     if compared:
         other = axes.flat[1]
         _points(other, near, policies, "difference")
+        other.locator_params(axis="x", nbins=6)
         other.set_xlabel("share of the device: difference [-]")
         other.set_ylabel("tracking error, rms: difference [deg]")
         other.set_title(f"mean difference to {policies[0]['title']}, patient by patient", fontsize=9)
