@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -118,10 +119,13 @@ def results_of(
     loads: Sequence[float] = (), settings: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """What `evaluate` returns, from the episodes of each policy."""
-    found = {}
+    found: dict[str, Any] = {}
+    titles = [one.title for one in policies]
     for one, those in zip(policies, episodes, strict=True):
+        shared = f" ({Path(one.name).name})" if titles.count(one.title) > 1 else ""
         found[one.name] = {
-            "title": one.title, "summary": summary(those, seed), "summary_able": summary(able_ones(those), seed),
+            "title": one.title + shared, "training": one.training,
+            "summary": summary(those, seed), "summary_able": summary(able_ones(those), seed),
             "difference": differences(those, episodes[0], seed), "episodes": those,
         }  # fmt: skip
     return {

@@ -51,6 +51,8 @@ def export(
     else:
         raise InputError(f"'{source}' is neither the folder of a training or policy nor a .zip of Stable-Baselines3.")
     check_writable(out / DESCRIPTION)
+    # One of an earlier export would be of another policy.
+    (out / ONNX).unlink(missing_ok=True)
     policy.save(out)
     if onnx and _onnx_installed():
         from agents.onnx_file import write_onnx

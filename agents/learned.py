@@ -50,6 +50,12 @@ class Description(Settings):
     seed: int | None = None
     weights_sha256: str = ""
 
+    @property
+    def common(self) -> str:
+        """A digest of all but steps, seed and weights: the same for trainings that differ in nothing but the seed."""
+        facts = self.model_dump(mode="json", exclude={"steps", "seed", "weights_sha256", "title"})
+        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+
 
 def world_facts(env: gymnasium.Env) -> dict[str, Any]:
     """What a description holds of an environment."""
@@ -79,7 +85,7 @@ class LearnedPolicy(Policy):
         # A policy's own, where those of baselines are of the class.
         own: dict[str, Any] = {
             "name": name, "title": description.title, "action_mode": description.action_mode,
-            "observation": description.observation,
+            "observation": description.observation, "training": description.common,
         }  # fmt: skip
         self.__dict__.update(own)
 

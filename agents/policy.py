@@ -16,6 +16,8 @@ class Policy(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
+    training: ClassVar[str | None] = None
+    """What trainings that differ in nothing but the seed have in common; None: not trained, or not known."""
     action_mode: ClassVar[str]
     """Of the environment it acts in."""
     observation: ClassVar[tuple[str, ...]] = ("device",)

@@ -96,18 +96,21 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
 
 
 def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Policies whose titles differ in nothing but the seed, as one: its numbers are means over the trainings."""
-    groups: dict[str, list[Any]] = {}
+    """Trainings that differ in nothing but the seed, as one: its numbers are means over the trainings."""
+    groups: dict[tuple[str, str | None], list[Any]] = {}
     for one in policies.values():
         name, seeded, _ = one["title"].rpartition(", seed ")
         if seeded:
-            groups.setdefault(name, []).append(one["episodes"])
-    found = {}
-    for name, parts in groups.items():
-        if len(parts) > 1 and len({len(part) for part in parts}) == 1:
+            groups.setdefault((name, one.get("training")), []).append(one)
+    found: dict[str, Any] = {}
+    for (name, _), ones in groups.items():
+        titles, parts = [one["title"] for one in ones], [one["episodes"] for one in ones]
+        seeds = {title.rpartition(", seed ")[2].split()[0] for title in titles}
+        if len(parts) == len(seeds) > 1 and len({len(part) for part in parts}) == 1:
             episodes, title = [e for part in parts for e in part], f"{name}, {len(parts)} seeds"
+            title += f" ({len(found) + 1})" if title in found else ""
             found[title] = {
-                "title": title, "trainings": len(parts), "episodes": episodes,
+                "title": title, "trainings": len(parts), "episodes": episodes, "of": titles,
                 "summary": summary(episodes, seed, len(parts)),
                 "summary_able": summary(able_ones(episodes), seed, len(parts)),
             }  # fmt: skip
@@ -212,7 +215,7 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
         return []
     episodes = results["policies"][judged.name]["episodes"]
     worst = max(episodes, key=lambda e: (e["measures"]["unsafe"], e["measures"]["tracking_rms_deg"]))
-    columns = {f"worst of {len(episodes)} patients with {judged.title}": [_again(p, worst, results) for p in shown]}
+    columns = {f"worst of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
     report_figures.courses(out / "worst_patient.png", columns)
     m = worst["measures"]
     said = worst["event"] or f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"

@@ -43,7 +43,7 @@ def learning_curves(path: Path, groups: Sequence[Group]) -> None:
             seeds = f"{n} seed{'s' * (n > 1)}"
             ax.plot(steps, values.mean(axis=0), color=colour, marker=".", label=f"{group.label} ({seeds})")
             ax.fill_between(steps, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0.0)
-        ax.set_xlabel("environment steps")
+        ax.set_xlabel("decisions")
         ax.set_title(label, fontsize=10)
         ax.ticklabel_format(axis="x", style="sci", scilimits=(0, 4), useMathText=True)
     legend(figure, axes.flat[0], 4)
@@ -121,9 +121,7 @@ def _points(ax: Any, shown: Sequence[Mapping[str, Any]], policies: Sequence[Mapp
 
 def _pool(policy: Mapping[str, Any], policies: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The trainings with which a policy is shown together, or None."""
-    name, seeded, _ = policy["title"].rpartition(", seed ")
-    pools = [p for p in policies if "trainings" in p and p["title"].startswith(f"{name}, ")]
-    return pools[0] if seeded and pools else None
+    return next((p for p in policies if policy["title"] in p.get("of", ())), None)
 
 
 def _front(ax: Any, policies: Sequence[Mapping[str, Any]]) -> None:

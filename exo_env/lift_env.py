@@ -222,6 +222,8 @@ class ElbowLiftEnv(gymnasium.Env):
         """First part of a reset: draw an episode. The second opens it in compiled code, the third is `opened`."""
         super().reset(seed=seed)
         self._over, self._episode = True, None
+        if not isinstance(options, Mapping | None):
+            raise InputError(f"options = {options!r}; a mapping with some of {choices(OPTIONS)} is wanted, or None.")
         for name in options or {}:
             if name not in OPTIONS:
                 raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")

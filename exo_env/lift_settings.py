@@ -31,6 +31,8 @@ def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:
     """Distribution of the weight on the machine [kg]."""
     spec = {"uniform": [0.5, 2.0]} if load is None else load
     try:
+        if isinstance(spec, float) and not np.isfinite(spec):
+            raise InputError(f"a number from {LEAST_LOAD} to {MOST_LOAD} kg is wanted.")
         found = distribution(spec)
         if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in found.limits()):
             raise InputError(f"numbers from {LEAST_LOAD} to {MOST_LOAD} kg are wanted.")

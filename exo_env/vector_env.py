@@ -85,6 +85,8 @@ class ElbowLiftVectorEnv(VectorEnv):
         Raises:
             InputError: seeds or mask do not fit, or an option is not usable.
         """
+        if not isinstance(options, dict | None):
+            raise InputError(f"options = {options!r}; one mapping for all worlds is wanted, or None.")
         options = dict(options or {})
         mask = self._mask(options.pop("reset_mask", None))
         seeds = self._seeds(seed)

@@ -104,6 +104,10 @@ def test_trainings_that_differ_in_the_seed_are_pooled(evaluated):
     found = json.loads((evaluated / "evaluation.json").read_text())["policies"]
     twins = {f"run{k}": {**found[name], "title": f"PPO, seed {k}"} for k, name in enumerate(("pid", "none"))}
     assert pooled(found | {"run0": twins["run0"]}, 0) == {}
+    # Another network, or the same seed twice, is no further training of the same.
+    assert pooled(found | {"run0": twins["run0"], "run1": twins["run1"] | {"training": "other"}}, 0) == {}
+    again = {"run0": twins["run0"], "run1": twins["run1"] | {"title": "PPO, seed 0 (run1)"}}
+    assert pooled(found | again, 0) == {}
     both = pooled(found | twins, 0)
     assert list(both) == ["PPO, 2 seeds"] and both["PPO, 2 seeds"]["trainings"] == 2
     one, other = (by_patient(found[name]["episodes"], "return") for name in ("pid", "none"))

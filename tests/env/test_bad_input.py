@@ -6,6 +6,7 @@ import pytest
 
 from dms_core.errors import InputError
 from exo_env.lift_env import ElbowLiftEnv
+from exo_env.vector_env import ElbowLiftVectorEnv
 
 
 @pytest.mark.parametrize(
@@ -111,3 +112,18 @@ def test_a_population_file_with_a_wrong_value(tmp_path):
     path.write_text("base: healthy\nfields:\n  strength: {uniform: [0.5, 99.0]}\n")
     with pytest.raises(InputError, match="wrong.yaml.*strength"):
         ElbowLiftEnv(patient=str(path))
+
+
+@pytest.mark.parametrize("options", [3, [{"load": 1.0}], "load"])
+def test_options_that_are_no_mapping_are_refused(options):
+    env, batch = ElbowLiftEnv(), ElbowLiftVectorEnv(2)
+    for world in (env, batch):
+        with pytest.raises(InputError, match="options = .* mapping"):
+            world.reset(seed=0, options=options)
+    batch.close()
+
+
+def test_a_load_that_is_no_number_is_refused_in_a_line():
+    with pytest.raises(InputError, match=r"load = nan: a number from 0.05 to 50.0 kg") as caught:
+        ElbowLiftEnv(load=float("nan"))
+    assert "\n" not in str(caught.value)
