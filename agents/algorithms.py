@@ -41,6 +41,8 @@ NOT_GIVEN = (
 STATE_DEPENDENT = {"use_sde", "sde_sample_freq"}
 SCHEDULE = re.compile(r"lin_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """A value that falls linearly from this one to 0 at the end of the training."""
+SMALL = 0.01
+"""Share that is left of the weights of an output layer: Stable-Baselines3's gain for those of PPO."""
 SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
 """Arguments that lie from 0 to 1, and above 0."""
 
@@ -65,8 +67,9 @@ def arguments(config: Config) -> dict[str, Any]:
     name, algorithm = config.training.algorithm, find(config.training.algorithm)
     if config.policy not in policies(name):
         raise InputError(f"policy = '{config.policy}'; {name} takes {choices(policies(name))}.")
-    if config.training.start is not None and name not in ("ppo", "recurrent_ppo"):
-        raise InputError(f"training.start is for ppo and recurrent_ppo, not for {name}.")
+    start = config.training.start
+    if start is not None and name in ("sac", "tqc") and max(map(abs, start)) == 1.0:
+        raise InputError(f"training.start = {list(start)}; actions of {name} never reach -1 or 1, give less.")
     if config.training.critic and (name, config.policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
         raise InputError("training.critic is for the MlpPolicy of ppo, without frame_stack.")
     _check(name, config.arguments, allowed(algorithm), OURS)
@@ -122,10 +125,25 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
         said = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
     if config.training.start is not None:
-        last: Any = found.policy
-        with torch.no_grad():
-            last.action_net.bias[:] = torch.tensor(config.training.start)
+        _begin_at(found.policy, torch.tensor(config.training.start))
     return found
+
+
+def _begin_at(policy: Any, action: torch.Tensor) -> None:
+    """Make an untrained policy act near an action.
+
+    Output layers of PPO begin with weights so small that their bias is what they say. Those of SAC and TQC do not, and
+    their noise covers the range; both are brought to what PPO begins with, the noise by `log_std_init`, which these
+    algorithms otherwise use for state-dependent exploration alone. It is that of the output before its tanh.
+    """
+    actor = getattr(policy, "actor", None)
+    with torch.no_grad():
+        if actor is None:
+            policy.action_net.bias[:] = action
+            return
+        for layer, bias in ((actor.mu, torch.atanh(action)), (actor.log_std, torch.tensor(actor.log_std_init))):
+            layer.weight *= SMALL
+            layer.bias[:] = bias
 
 
 def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str] = ()) -> None:

@@ -46,7 +46,7 @@ class Training(Settings):
     )
     hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held, see hold.py")
     start: tuple[Component, Component] | None = Field(
-        default=None, description="action of PPO's untrained policy, from which it learns to differ; None: 0 and 0"
+        default=None, description="action of the untrained policy, from which it learns to differ; None: 0 and 0"
     )
     against: tuple[Component, Component] | None = Field(
         default=None,
