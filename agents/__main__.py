@@ -22,18 +22,18 @@ from tyro.conf import arg
 
 from agents.baselines import POLICIES
 from agents.evaluate import evaluate as run_all
-from agents.evaluate import table
 from agents.export import export
 from agents.figure import draw
-from agents.learned import find_policy, shipped_policies
+from agents.learned import find_policy, repetitions_of, shipped_policies
 from agents.report import report
 from agents.sweep import sweep
+from agents.tables import heading, short_table, statistic, whole_table
 from agents.train_command import train
 from agents.tune_command import tune_baselines
 from agents.video import video
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
-from dms_core.output_file import check_writable, write_json
+from dms_core.output_file import check_writable, whole_file, write_json
 from exo_env.panels import require_matplotlib
 from exo_env.population import population as find_population
 
@@ -45,11 +45,11 @@ def evaluate(
     patients: int = 20,
     seed: int = 0,
     loads: tuple[float, ...] = (),
-    repetitions: int = 1,
+    repetitions: int | None = None,
     workers: Literal["here", "ray"] = "here",
     address: str | None = None,
 ) -> int:
-    """Run policies on the same patients: a table, evaluation.json and evaluation.png.
+    """Run policies on the same patients: a table, evaluation.json, evaluation.md and evaluation.png.
 
     Args:
         policy_names: one or more, see `python -m agents policies`, or folders of trained ones.
@@ -58,13 +58,14 @@ def evaluate(
         patients: how many; one episode each, or one a load.
         seed: of the patients and of the bootstrap.
         loads: that each patient lifts [kg]; one drawn for each patient where none is given.
-        repetitions: of the movement in an episode.
+        repetitions: of the movement in an episode; as the trained policies learned, 1 without one, where not given.
         workers: 'ray' shares the episodes out, with the same results to the last bit.
         address: of a Ray cluster; a local one is started where it is not given.
     """
     if len(set(policy_names)) < max(len(policy_names), 1):
         raise InputError(f"--policy {' '.join(policy_names)}: one or more different names are wanted.")
     used = [find_policy(name) for name in policy_names]
+    often = repetitions_of(used, repetitions)
     find_population(population)
     require_matplotlib()
     check_writable(out / "evaluation.json")
@@ -81,15 +82,16 @@ def evaluate(
 
             results = evaluate_by_ray(
                 used, population, patients, seed, loads=loads, address=address, progress=progress,
-                repetitions=repetitions,
+                repetitions=often,
             )  # fmt: skip
         else:
-            results = run_all(used, population, patients, seed, loads=loads, progress=progress, repetitions=repetitions)
+            results = run_all(used, population, patients, seed, loads=loads, progress=progress, repetitions=often)
     write_json(out / "evaluation.json", _json(results))
     draw(out / "evaluation.png", results)
-    print(f"{patients} patients of '{population}', seed {seed}: interquartile mean [95 % bootstrap interval]")
-    print(table(results))
-    print(f"written: {out}")
+    with whole_file(out / "evaluation.md") as file:
+        file.write("\n".join(whole_table(results)))
+    print(f"{heading(results)}\n{statistic(results)}\n\n{short_table(results)}\n")
+    print(f"written: {out} (all measures: evaluation.md, all episodes: evaluation.json)")
     return 0
 
 

@@ -15,21 +15,16 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.baselines import POLICIES
 from agents.measures import MEASURES, Record, measured
 from agents.policy import Policy
-from agents.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, interquartile_mean, mean
+from agents.statistics import CONFIDENCE, RESAMPLES, estimate, interquartile_mean, mean
 from dms_core.errors import InputError
 from exo_env.need import ABLE
 from exo_env.population import Source, population
 
 ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
-OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
-"""Measures that are printed of them."""
 COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
 """Measures whose differences between policies are estimated, patient by patient."""
-LEAST = 1e-6
-"""Of what is printed, in the unit of any measure."""
 Case = tuple[int, float | None]
 """Seed of an episode and its load [kg], None for the one that the seed draws."""
 
@@ -201,59 +196,3 @@ def differences(
 def able_ones(episodes: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Episodes of patients who can do something with their load."""
     return [e for e in episodes if e["ability"] >= ABLE]
-
-
-def table(results: dict[str, Any]) -> str:
-    """What is printed: a row a measure, a column a policy, interval in brackets; then some of who can do something.
-
-    That second part is left out where everybody can, and differences where there is one policy.
-    """
-    rows = table_rows(results)
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    lines = ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
-             for row in rows]  # fmt: skip
-    return "\n".join(line.rstrip() for line in lines)
-
-
-def _rows(policies: Mapping[str, Any], summary: str, measures: Sequence[str]) -> list[list[str]]:
-    """A row a measure."""
-    found = []
-    for m in MEASURES:
-        if m.name in measures:
-            label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
-            found.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in policies.values())])
-    return found
-
-
-def table_rows(results: dict[str, Any]) -> list[list[str]]:
-    """Cells of the table, the first row its head."""
-    policies, seed = results["policies"], results["seed"]
-    names = list(policies)
-    everybody = policies[names[0]]["episodes"]
-    able = able_ones(everybody)
-    count, apart = len({e["seed"] for e in able}), len(able) < len(everybody)
-    rows = [["", *names], *_rows(policies, "summary", [m.name for m in MEASURES])]
-    if apart:
-        rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
-        rows += _rows(policies, "summary_able", OF_THE_ABLE)
-    for other in dict.fromkeys([names[0], best_baseline(policies) or names[0]] if len(names) > 1 else []):
-        those, said = policies[other]["episodes"], f"mean difference to {other}, patient by patient"
-        for head, kept in ((said, list), (f"{said}, of these {count}", able_ones))[: 2 if apart else 1]:
-            found = {
-                n: {"d": differences(kept(p["episodes"]), kept(those), seed, p.get("trainings", 1))}
-                for n, p in policies.items()
-            }
-            rows += [[head, *("" for _ in names)], *_rows(found, "d", COMPARED)]
-    return rows
-
-
-def best_baseline(policies: Mapping[str, Any]) -> str | None:
-    """Name of the classical policy with the best return."""
-    known = [name for name in policies if name in POLICIES]
-    return max(known, key=lambda name: policies[name]["summary"]["return"]["value"], default=None)
-
-
-def _cell(e: Estimate) -> str:
-    """Value and interval; what is below `LEAST` is round-off, and 0."""
-    value, low, high = (0.0 if abs(x) < LEAST else x for x in (e.value, e.low, e.high))
-    return f"{value:.3g} [{low:.3g}, {high:.3g}]"

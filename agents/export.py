@@ -60,8 +60,10 @@ def export(
         write_onnx(policy, out / ONNX)
     elif onnx:
         print(f'{ONNX} is left out; it needs: pip install -c constraints.txt -e ".[export]"')
-    d = policy.description
-    print(f"{d.title}, {d.steps} steps, {sum(a.size for a in policy.arrays.values())} numbers")
+    d, which = policy.description, ""
+    if (source / RECORD).is_file():
+        which = "last checkpoint, " if last else "best on the patients set aside, "
+    print(f"{d.title}, {which}{d.steps} steps, {sum(a.size for a in policy.arrays.values())} numbers")
     print(f"written: {out}")
     return 0
 

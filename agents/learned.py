@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -173,6 +173,23 @@ def find_policy(name: str) -> Policy:
         raise InputError(f"policy '{name}': there is no such folder.")
     known = [*POLICIES, *shipped_policies()]
     raise InputError(f"unknown policy '{name}'. There are: {choices(known)}, and folders of trained policies.")
+
+
+def repetitions_of(policies: Sequence[Policy], given: int | None = None) -> int:
+    """Repetitions of an episode: as given, else as the trained policies among these learned, else 1.
+
+    Raises:
+        InputError: they learned with different ones.
+    """
+    if given is not None:
+        return given
+    learned = {
+        p.name: int(p.description.env_kwargs.get("repetitions", 1)) for p in policies if isinstance(p, LearnedPolicy)
+    }
+    if len(set(learned.values())) > 1:
+        said = ", ".join(f"{name} with {often}" for name, often in learned.items())
+        raise InputError(f"these policies were trained with different repetitions ({said}); give --repetitions.")
+    return next(iter(learned.values()), 1)
 
 
 def shipped_policies() -> list[str]:

@@ -13,11 +13,12 @@ from agents import report_figures
 from agents.baselines import POLICIES
 from agents.config import Config
 from agents.courses import Course, course
-from agents.evaluate import able_ones, differences, summary, table_rows
+from agents.evaluate import able_ones, differences, summary
 from agents.learned import find_policy, shipped_policies
 from agents.policy import Policy
 from agents.report_figures import Group
 from agents.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
+from agents.tables import whole_table
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, whole_file
 from exo_env.panels import require_matplotlib
@@ -162,7 +163,7 @@ def _trainings(out: Path, trainings: Mapping[Path, list[dict[str, Any]]]) -> lis
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
+    return "-" if value is None else f"{value:.4g}"
 
 
 def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
@@ -171,14 +172,7 @@ def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
         for estimate in found["summary"].values():
             estimate.update({k: float("nan") for k, v in estimate.items() if v is None})
     report_figures.pareto(out / f"pareto{suffix}.png", results)
-    head, *rows = table_rows(results)
-    lines = [
-        f"## {results['patients']} patients, {results['population']}, seed {results['seed']}", "",
-        f"Interquartile mean [{100 * results['confidence']:g} % bootstrap interval].", "",
-        f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
-        f"![Tracking over the share of the device](pareto{suffix}.png)", "",
-    ]  # fmt: skip
-    return lines
+    return [*whole_table(results), f"![Tracking over the share of the device](pareto{suffix}.png)", ""]
 
 
 def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], trainings: Mapping[Path, Any]) -> list[Policy]:
@@ -215,7 +209,8 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
         return []
     episodes = results["policies"][judged.name]["episodes"]
     worst = max(episodes, key=lambda e: (e["measures"]["unsafe"], e["measures"]["tracking_rms_deg"]))
-    columns = {f"worst of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
+    why = "ended early" if worst["measures"]["unsafe"] else "largest error"
+    columns = {f"{why} of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
     report_figures.courses(out / "worst_patient.png", columns)
     m = worst["measures"]
     said = worst["event"] or f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from agents.evaluate import world_of
-from agents.learned import find_policy
+from agents.learned import find_policy, repetitions_of
 from agents.policy import Policy
 from dms_core.errors import DmsError, InputError
 from dms_core.output_file import check_writable
@@ -30,6 +30,7 @@ def video(
     out: Path,
     patient: str = "stroke_severe",
     seed: int = 0,
+    repetitions: int | None = None,
 ) -> int:
     """Film policies side by side, with the same patient, load and repetition.
 
@@ -38,12 +39,15 @@ def video(
         out: .mp4, or .gif; without ffmpeg an .mp4 becomes a .gif.
         patient: population to draw from.
         seed: of the episode.
+        repetitions: of the movement; as the trained policies learned, 1 without one, where not given.
     """
     if not 1 <= len(set(policy_names)) == len(policy_names) <= MOST:
         raise InputError(f"--policy {' '.join(policy_names)}: one to {MOST} different names are wanted.")
     if out.suffix not in (".mp4", ".gif"):
         raise InputError(f"output '{out}': a name that ends in .mp4 or .gif is wanted.")
-    stages = [Stage(find_policy(name), patient, seed) for name in policy_names]
+    used = [find_policy(name) for name in policy_names]
+    often = repetitions_of(used, repetitions)
+    stages = [Stage(policy, patient, seed, repetitions=often) for policy in used]
     out = _possible(out)
     check_writable(out)
     rate, total = stages[0].rate, stages[0].length
@@ -60,11 +64,12 @@ class Stage:
         policy: that assists.
         patient: population to draw from.
         seed: of the episode.
+        settings: further ones of the environment.
     """
 
-    def __init__(self, policy: Policy, patient: str, seed: int) -> None:
+    def __init__(self, policy: Policy, patient: str, seed: int, **settings: Any) -> None:
         self.policy = policy
-        self.env = world_of(policy, population(patient).model_dump(), render_mode="rgb_array")
+        self.env = world_of(policy, population(patient).model_dump(), render_mode="rgb_array", **settings)
         self.observation, self.info = self.env.reset(seed=seed)
         policy.reset(self.env)
         world: Any = self.env.unwrapped

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import sys
+import time
 from pathlib import Path
 
 from numba.core import event
@@ -17,6 +19,8 @@ from numba.core.caching import NullCache
 
 PACKAGE = Path(__file__).parent
 STAMP = "compiled_sources.sha256"
+QUIET = 1.0
+"""Pause after which more compiling is told of again [s]."""
 
 
 LAYOUT = ("assembly", "jit.py")
@@ -48,15 +52,20 @@ def drop_stale_code(package: Path = PACKAGE) -> None:
 
 
 class _Announcer(event.Listener):
-    """Says once, on stderr, that code is being compiled: numba itself tells, so nothing is said from a warm cache."""
+    """Says on stderr that code is being compiled: numba itself tells, so nothing is said from a warm cache.
+
+    A first reset compiles, and so does the first step behind it: what comes after a while is said again.
+    """
 
     def __init__(self) -> None:
-        self.silent = False
+        self._last = -math.inf
 
     def on_start(self, event: event.Event) -> None:
         """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""
-        if not self.silent and not isinstance(event.data["dispatcher"]._cache, NullCache):
-            self.silent = True
+        if isinstance(event.data["dispatcher"]._cache, NullCache):
+            return
+        quiet, self._last = time.monotonic() - self._last > QUIET, time.monotonic()
+        if quiet:
             print(
                 "dms_core: compiling what is new, kept on disk (seconds; about a minute the very first time) ...",
                 file=sys.stderr,
@@ -64,14 +73,15 @@ class _Announcer(event.Listener):
             )
 
     def on_end(self, event: event.Event) -> None:
-        """Nothing to say."""
+        """The pause between two stretches of compiling begins."""
+        self._last = time.monotonic()
 
 
 _announcer: _Announcer | None = None
 
 
 def announce() -> None:
-    """From now on, say once on stderr when something has to be compiled."""
+    """From now on, say on stderr when something has to be compiled, once for each stretch of it."""
     global _announcer
     if _announcer is None:
         _announcer = _Announcer()

@@ -63,10 +63,6 @@ class RopeTension(_Drive):
             raise ValueError(f"max_tension = {list(self.max_tension)}: two numbers above 1 and up to 1500 N are wanted")
         return self
 
-    def largest(self, worn: WornExoskeleton) -> float:
-        """Largest tension of a motor [N]."""
-        return max(self.max_tension)
-
     def holding(self) -> np.ndarray:
         """The arm is held by the agonist."""
         return np.array([[0.0, 0.0], [self.max_tension[0], 0.0]])
@@ -106,10 +102,6 @@ class PidSetpoint(_Drive):
     filter_frequency: float = Field(default=20.0, gt=0.0, le=200.0, description="of the setpoint filter [rad/s]")
     filter_damping: float = Field(default=1.0, gt=0.0, le=5.0, description="damping ratio of the filter [-]")
     authority_rate: float = Field(default=10.0, gt=0.0, description="largest change of the authority [1/s]; assumed")
-
-    def largest(self, worn: WornExoskeleton) -> float:
-        """Largest tension of a motor [N]."""
-        return worn.device.actuator.max_tension
 
     def holding(self) -> np.ndarray:
         """No change, and half of the authority, as for an action of zeros."""

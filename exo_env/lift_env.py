@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -18,7 +19,7 @@ from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
 from dms_core.simulation.step_control import DONE, MATRIX_SINGULAR
 from exo_env.actions import checked_action, drive
-from exo_env.control_period import READING, STATUS, Plant, finish, run_period
+from exo_env.control_period import STATUS, Plant, finish, run_period
 from exo_env.ecosystem import Ecosystem
 from exo_env.episode import Episode
 from exo_env.events import NOTHING, Limits
@@ -157,7 +158,12 @@ class ElbowLiftEnv(gymnasium.Env):
         repetitions: int = 1,
         rtol: float | None = None,
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
+        if unknown:
+            keyword = inspect.Parameter.KEYWORD_ONLY
+            known = [n for n, p in inspect.signature(ElbowLiftEnv).parameters.items() if p.kind is keyword]
+            raise InputError(f"setting '{next(iter(unknown))}' is unknown; there are {choices(known)}.")
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = choices(self.metadata["render_modes"])
             raise InputError(f"render_mode = {render_mode!r}; one of {modes} is wanted, or None.")
@@ -352,8 +358,8 @@ class ElbowLiftEnv(gymnasium.Env):
         """What a picture shows of the present time."""
         from exo_env.staging import staged
 
-        episode, r = self.episode, self._readout
-        return staged(episode, r.angle, r[READING.hinge], r.reference, r.tensions, r.activations, self._label())
+        _ = self.episode
+        return staged(self._readout, self._label())
 
     def _label(self) -> str:
         """Names the patient in a picture."""

@@ -25,12 +25,14 @@ REFERENCE = (0, 140, 105)
 ACTIVATION: tuple[Colour, ...] = ((36, 88, 200), (146, 66, 158), (220, 28, 40))
 """Of muscles, from activation 0 to 1: blue, purple, red."""
 TENSION: tuple[Colour, ...] = ((196, 200, 206), (244, 180, 48), (190, 72, 0))
-"""Of the device's ropes, from slack to the largest tension: grey, yellow, brown."""
+"""Of the device's ropes, from slack to FULL_TENSION and beyond: grey, yellow, brown."""
+FULL_TENSION = 200.0
+"""End of the scale of tensions [N], the same in all pictures: what holds 2 kg in a limp arm."""
 WINDOW = 2.8
 """Side of the main view over the length of the upper arm [-]."""
 ELBOW_AT = (0.27, 0.47)
 """Place of the elbow in the main view, as shares of its side from the left and from the top."""
-READINGS: Box = (304, 10, 166, 92)
+READINGS: Box = (304, 10, 166, 140)
 INSET: Box = (352, 318, 118, 152)
 SCALES: Box = (10, 416, 180, 54)
 BAR = 72
@@ -62,9 +64,9 @@ def lighter(colour: Colour) -> Colour:
     return red + (255 - red) // 4, green + (255 - green) // 4, blue + (255 - blue) // 4
 
 
-def tension_share(tension: float, largest: float) -> float:
-    """Place on the scale of tensions, 0 to 1: the square root, so that a tenth of the largest is well seen."""
-    return float(np.sqrt(min(max(tension / largest, 0.0), 1.0)))
+def tension_share(tension: float) -> float:
+    """Place on the scale of tensions, 0 to 1: the square root, so that a tenth of its end is well seen."""
+    return float(np.sqrt(min(max(tension / FULL_TENSION, 0.0), 1.0)))
 
 
 class View(NamedTuple):
@@ -116,7 +118,7 @@ class Picture:
             weight_at = self._machine(scene, scene.gym_rope)
         self.canvas.smooth()
         self._readings(scene)
-        self._scale_words(scene)
+        self._scale_words()
         if scene.gym_rope is not None and scene.weight_mass is not None:
             self.canvas.words(f"{scene.weight_mass:.3g} kg", weight_at, INK, "small", "centre")
 
@@ -165,13 +167,13 @@ class Picture:
         """Links, horns of the ropes, ropes, hinge."""
         bars = [(view(link), 7.0) for link in scene.exo_links]
         hinge = bars[0][0][-1] if bars else view(scene.elbow)
-        bars += [(np.array([hinge, view(points)[-1]]), 4.0) for points, _, _ in scene.ropes]
+        bars += [(np.array([hinge, view(points)[-1]]), 4.0) for points, _ in scene.ropes]
         for points, width in bars:
             self.canvas.line(points, STEEL_EDGE, width + 2.0)
         for points, width in bars:
             self.canvas.line(points, STEEL, width)
-        for points, tension, largest in scene.ropes:
-            share = tension_share(tension, largest)
+        for points, tension in scene.ropes:
+            share = tension_share(tension)
             colour, width = gradient(TENSION, share), 1.8 + 3.0 * share
             self.canvas.line(view(points), darker(colour), width + 1.2)
             self.canvas.line(view(points), colour, width)
@@ -215,6 +217,8 @@ class Picture:
             end = rope[-1] if scene.weight is None else scene.weight
             centre = view(end) / unit
             self.canvas.box((centre[0] - 11, centre[1] - 8, 22, 16), IRON, round_by=2.5)
+            # The rail would strike through the words.
+            self.canvas.box((centre[0] - 24, centre[1] + 9, 48, 12), CARD)
         return float(centre[0]), float(centre[1]) + 11.0
 
     # Numbers
@@ -226,20 +230,19 @@ class Picture:
             for k in range(BAR // 2):
                 self.canvas.box((column + 2 * k, y + 23, 2, 9), gradient(colours, (2 * k + 1) / BAR))
 
-    def _scale_words(self, scene: Scene) -> None:
-        """Titles and ends of the bars; half of the scale of tensions is a quarter of the largest."""
+    def _scale_words(self) -> None:
+        """Titles and ends of the bars; half of the scale of tensions is a quarter of its end."""
         x, y, width, _ = SCALES
-        largest = max((limit for _, _, limit in scene.ropes), default=0.0)
         for column, title, ends in (
             (x + 10, "activation", ("0", "0.5", "1")),
-            (x + width - 10 - BAR, "tension [N]", ("0", f"{0.25 * largest:.0f}", f"{largest:.0f}")),
+            (x + width - 10 - BAR, "tension [N]", ("0", f"{0.25 * FULL_TENSION:.0f}", f"{FULL_TENSION:.0f}")),
         ):
             self.canvas.words(title, (column, y + 7), GREY, "small")
             for text, share, align in zip(ends, (0.0, 0.5, 1.0), ALIGNMENTS, strict=True):
                 self.canvas.words(text, (column + share * BAR, y + 37), GREY, "small", align)
 
     def _readings(self, scene: Scene) -> None:
-        """Patient, time, angle, reference and error."""
+        """Patient, time, angle, reference and error, and who does how much."""
         x, y, width, _ = READINGS
         self.canvas.words(scene.label, (x + 10, y + 9), INK, "small", width=width - 20)
         rows = (
@@ -247,6 +250,9 @@ class Picture:
             ("angle", f"{np.degrees(scene.elbow_angle):.1f}\u00b0", INK),
             ("reference", f"{np.degrees(scene.reference_angle):.1f}\u00b0", REFERENCE),
             ("error", f"{scene.error_deg:+.1f}\u00b0", INK),
+            ("muscles", f"{scene.muscle_moment:.1f} Nm", INK),
+            ("device", f"{scene.device_moment:.1f} Nm", INK),
+            ("effort", f"{scene.effort:.2f}", INK),
         )
         for k, (name, value, colour) in enumerate(rows):
             self.canvas.words(name, (x + 10, y + 28 + 15 * k), GREY)

@@ -62,7 +62,9 @@ class Population(Settings):
             InputError: there is none of this name; lists those there are.
         """
         if name not in shipped_populations():
-            raise InputError(f"unknown population '{name}'. Shipped are: {choices(shipped_populations())}.")
+            raise InputError(
+                f"unknown population '{name}'. Shipped are: {choices(shipped_populations())}; or give a YAML file."
+            )
         return cls.read(configs() / FOLDER / f"{name}.yaml")
 
     @classmethod

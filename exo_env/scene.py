@@ -12,8 +12,8 @@ import numpy as np
 
 MusclePath = tuple[np.ndarray, float]
 """(points from origin to insertion [m], shape (n, 2); activation 0 to 1 [-])."""
-RopePath = tuple[np.ndarray, float, float]
-"""(points from the motor on [m], shape (n, 2); tension [N]; largest tension of the motor [N])."""
+RopePath = tuple[np.ndarray, float]
+"""(points from the motor on [m], shape (n, 2); tension [N])."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +41,12 @@ class Scene:
     """Since the start of the episode [s]."""
     error_deg: float
     """Elbow flexion minus reference [deg]."""
+    muscle_moment: float
+    """Of the muscles about the elbow, flexion positive [Nm]."""
+    device_moment: float
+    """Of the device's ropes about its hinge, flexion positive [Nm]."""
+    effort: float
+    """Share of what was planned that the patient still intends [-]."""
     label: str = ""
     """Names the patient."""
     weight: np.ndarray | None = None

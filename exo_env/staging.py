@@ -7,36 +7,26 @@ import math
 import numpy as np
 
 from dms_core.model.frames import rotation_matrix
+from exo_env.control_period import READING
 from exo_env.episode import Episode
 from exo_env.exoskeleton import AGONIST, ANTAGONIST
 from exo_env.gym_machine import HANDLE, WEIGHT
 from exo_env.human import MUSCLES
+from exo_env.readout import Readout
 from exo_env.scene import MusclePath, RopePath, Scene
 
 UPPER_END = 0.22
 """Drawn length of the upper link [m]."""
 
 
-def staged(
-    episode: Episode,
-    angle: float,
-    hinge: float,
-    reference: float,
-    tensions: np.ndarray,
-    activations: np.ndarray,
-    label: str,
-) -> Scene:
+def staged(now: Readout, label: str) -> Scene:
     """The present scene.
 
     Args:
-        episode: whose world is shown.
-        angle: of the elbow [rad].
-        hinge: of the device [rad].
-        reference: psi [rad].
-        tensions: of agonist and antagonist [N], shape (2,).
-        activations: of the muscles [-], shape (6,).
+        now: readings of the episode that is shown.
         label: names the patient.
     """
+    episode, angle, hinge = now.episode, now.angle, now[READING.hinge]
     arm, machine = episode.arm, episode.ecosystem.machine
     assert machine is not None
     grip = arm.elbow + arm.rotation(angle) @ arm.grip
@@ -49,13 +39,16 @@ def staged(
         shoulder=arm.segments["humerus"].origin[:2].copy(),
         elbow=arm.elbow[:2].copy(),
         grip=grip[:2],
-        muscles=_muscles(episode, angle, activations),
-        ropes=_ropes(episode, hinge, tensions),
+        muscles=_muscles(episode, angle, now.activations),
+        ropes=_ropes(episode, hinge, now.tensions),
         exo_links=_links(episode, hinge),
         elbow_angle=angle,
-        reference_angle=reference,
+        reference_angle=now.reference,
         time=episode.world.time,
-        error_deg=math.degrees(angle - reference),
+        error_deg=math.degrees(now.error),
+        muscle_moment=now[READING.muscle_moment],
+        device_moment=now[READING.exo_moment],
+        effort=episode.effort,
         label=label,
         weight=weight[:2],
         weight_mass=episode.ecosystem.weight,
@@ -76,11 +69,11 @@ def _muscles(episode: Episode, angle: float, activations: np.ndarray) -> tuple[M
 
 def _ropes(episode: Episode, hinge: float, tensions: np.ndarray) -> tuple[RopePath, ...]:
     """Paths of the ropes with their tensions."""
-    worn, largest, found = episode.worn, episode.drive.largest(episode.worn), []
+    worn, found = episode.worn, []
     for name, tension in zip((AGONIST, ANTAGONIST), tensions, strict=True):
         rope = getattr(worn.device, name)
         ends = np.array([_on_upper(episode, rope.upper), _on_lower(episode, hinge, rope.lower)])
-        found.append((ends[:, :2], float(tension), float(largest)))
+        found.append((ends[:, :2], float(tension)))
     return tuple(found)
 
 

@@ -41,5 +41,13 @@ def test_said_once_when_code_is_missing_and_never_when_it_is_there(said):
     assert said(cache=True) == ""
 
 
+def test_said_again_for_what_is_compiled_after_a_pause(tmp_path):
+    (tmp_path / "kernels.py").write_text(KERNELS.format(cache=True))
+    env = os.environ | {"PYTHONPATH": os.pathsep.join([str(configs().parent), str(tmp_path)])}
+    call = CALL + "; import time; time.sleep(1.2); assert kernels.two(1.0) == 3.0; assert kernels.two(1.5) == 3.5"
+    done = subprocess.run([sys.executable, "-c", call], env=env, capture_output=True, text=True, check=True)
+    assert done.stderr.count("compiling what is new") == 2
+
+
 def test_functions_that_are_not_kept_are_not_announced(said):
     assert said(cache=False) == ""

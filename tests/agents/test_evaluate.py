@@ -8,10 +8,11 @@ import pytest
 
 from agents.__main__ import main
 from agents.baselines import POLICIES, policy
-from agents.evaluate import by_patient, evaluate, patient_seeds, table
+from agents.evaluate import by_patient, evaluate, patient_seeds
 from agents.learned import shipped_policies
 from agents.measures import MEASURES
 from agents.statistics import interquartile_mean
+from agents.tables import short_table, whole_table
 
 SHORT = {"episode_duration": 0.6}
 """Until the lift has begun; a whole episode tells no more and takes ten times as long."""
@@ -42,7 +43,7 @@ def test_who_can_do_something_is_summed_up_apart():
         assert 0 < len(able) < 6
         assert one["summary_able"]["return"]["count"] == len(able)
         assert one["summary_able"]["return"]["value"] == pytest.approx(interquartile_mean(np.array(able)))
-    assert f"of the {len(able)} with ability from 0.2" in table(found)
+    assert f"of the {len(able)} with ability from 0.2" in "\n".join(whole_table(found))
 
 
 def test_nothing_is_printed_twice():
@@ -52,7 +53,7 @@ def test_nothing_is_printed_twice():
         for p in results["policies"].values():
             for e in p["episodes"]:
                 e["ability"] = 1.0
-        said = table(results)
+        said = "\n".join(whole_table(results))
         assert "with ability" not in said and "of these" not in said
         assert said.count("mean difference to") == differences
         assert said.count("work of the device") == 1 + differences
@@ -62,7 +63,17 @@ def test_round_off_is_printed_as_zero():
     found = run(["none"])
     work = found["policies"]["none"]["summary"]["device_work_share"]
     work |= {"value": 3e-9, "low": -2e-17, "high": 0.0123}
-    assert " 0 [0, 0.0123]\n" in table(found)
+    assert "| 0 [0, 0.0123] |" in "\n".join(whole_table(found))
+
+
+def test_what_is_printed_fits_a_terminal():
+    found = run(list(POLICIES))
+    head, *rows = short_table(found).splitlines()
+    assert [row.split()[0] for row in rows] == list(POLICIES) and "difference to" in head
+    assert max(map(len, [head, *rows])) <= 120
+    first, other = (found["policies"][name] for name in list(POLICIES)[:2])
+    expected = np.mean(by_patient(other["episodes"], "return") - by_patient(first["episodes"], "return"))
+    assert f"{expected:.3g} [" in rows[1] and "difference" not in short_table(run(["pid"]))
 
 
 def test_order_of_policies_does_not_matter():
@@ -108,11 +119,12 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
     pytest.importorskip("matplotlib")
     assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert all(m.label in printed for m in MEASURES)
+    assert "return" in printed and "evaluation.md" in printed
+    assert all(m.label in (tmp_path / "evaluation.md").read_text() for m in MEASURES)
     found = json.loads((tmp_path / "evaluation.json").read_text(), parse_constant=pytest.fail)
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 1
     assert (tmp_path / "evaluation.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.md", "evaluation.png"]
 
 
 def test_command_takes_repetitions(tmp_path, capsys):

@@ -222,7 +222,7 @@ def test_loaders_name_files_that_pass_the_hash_but_do_not_fit(tmp_path):
         ("seed = -1", ["--config", "{config}", "--seed", "-1"]),
         ("ppo.yml' is a file; a new or empty folder", ["--config", "{config}", "--out", "{config}"]),
         ("ppo.yml: unknown population 'martians'", ["--config", "{config}", "--set", "env_kwargs.patient=martians"]),
-        ("env_kwargs: got an unexpected keyword argument 'wings'", ["--config", "{config}", "--set", "env_kwargs.wings=2"]),  # noqa: E501
+        ("ppo.yml: setting 'wings' is unknown; there are action_mode", ["--config", "{config}", "--set", "env_kwargs.wings=2"]),  # noqa: E501
         ("ppo refuses its arguments", ["--config", "{config}", "--set", "n_steps=1", "n_envs=1"]),
     ],
 )  # fmt: skip

@@ -81,6 +81,7 @@ def test_step_before_reset_and_after_the_end():
         ({"repetitions": True}, "repetitions = True"),
         ({"reference": {"count": 2}}, "count"),
         ({"rtol": 1.0}, "rtol = 1.0"),
+        ({"wings": 2}, "setting 'wings' is unknown; there are action_mode, control_rate"),
         ({"render_mode": "ascii"}, "render_mode = 'ascii'; .*rgb_array"),
     ],
 )

@@ -71,7 +71,9 @@ def test_rewards():
 
 
 def test_arguments():
-    parameters = inspect.signature(ElbowLiftEnv).parameters
+    parameters = dict(inspect.signature(ElbowLiftEnv).parameters)
+    # What takes unknown ones to refuse them.
+    assert parameters.pop("unknown").kind is inspect.Parameter.VAR_KEYWORD
     assert [row[0].strip("`") for row in _tables("Arguments")[0]] == list(parameters)
     assert all(p.kind is inspect.Parameter.KEYWORD_ONLY for p in parameters.values())
     for name, default, _ in _tables("Arguments")[0]:
