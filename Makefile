@@ -17,7 +17,8 @@ OLDEST_GYMNASIUM := 1.2.0
 
 help:
 	@echo "make demo   the paper's four scenarios, then baselines and the learned policy: figures, tables, video, into $(OUT)"
-	@echo "make test   the tests"
+	@echo "            (a minute; the first time five more, for installing and compiling)"
+	@echo "make test   the tests (four minutes; the first time six more)"
 	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
 	@echo "make test-rllib  a training step of RLlib"
@@ -27,6 +28,7 @@ help:
 	@echo "make format rewrite the sources in the project's layout"
 	@echo "make docs   generate docs/model-files.md and the picture of the README"
 	@echo "make clean  remove .venv, out, build products and compiled kernels"
+	@echo "Variables: PYTHON=$(PYTHON) makes .venv, OUT=$(OUT) takes results, WORKERS=$(WORKERS) run tests side by side"
 
 # Made again when it is missing or when the dependencies change.
 $(STAMP): pyproject.toml constraints.txt
@@ -48,10 +50,11 @@ $(ALL_STAMP): $(TRAIN_STAMP)
 demo: $(STAMP)
 	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
 	$(BIN)/python -m agents evaluate --policy pid none pid_yielding pid_compensated assist_as_needed learned \
-	    --patients 20 --repetitions 3 --out $(OUT)/evaluation
+	    --patients 20 --out $(OUT)/evaluation
 	$(BIN)/python -m agents report $(OUT)/evaluation --policies pid learned --out $(OUT)/report
-	$(BIN)/python -m agents video --policy pid learned --patient stroke_severe --out $(OUT)/assist.mp4
-	@echo "Figures and tables: $(abspath $(OUT))/scenarios and $(abspath $(OUT))/report; video: $(abspath $(OUT))/assist.mp4"
+	$(BIN)/python -m agents video --policy none pid learned --patient stroke_severe --out $(OUT)/assist.mp4
+	@echo "In $(abspath $(OUT)): figures of the paper in scenarios, tables and figures of the policies in report/report.md,"
+	@echo "all measures of 20 patients in evaluation, a severe patient alone, with the PID and with the policy in assist.mp4"
 
 test: $(TRAIN_STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"

@@ -5,8 +5,9 @@
 A schedule is the device's PID with an authority and a setpoint below the reference, one pair until the arm is up and
 another one after, in every repetition the same. All schedules are tried on the same episode in one batch, and the best
 is picked with hindsight, which no policy has; beside it stands the schedule that is best for all patients together. It
-leaves out schedules that change more often, setpoints above the reference and antagonist ropes. What an episode of
-fewer repetitions gives is known from the same run, since an episode goes on as a shorter one ends.
+leaves out schedules that change more often, setpoints above the reference and antagonist ropes; what no device can do,
+whatever it is, with an error of that size is a bound (recruitment.py). What an episode of fewer repetitions gives is
+known from the same run, since an episode goes on as a shorter one ends.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ import tyro
 from tqdm import tqdm
 
 from agents.evaluate import patient_seeds
+from agents.recruitment import most_work
 from dms_core.errors import SimulationError
 from dms_core.output_file import check_writable, whole_file
 from exo_env.actions import PidSetpoint
 from exo_env.control_period import READING
+from exo_env.episode import Episode
 from exo_env.vector_env import ElbowLiftVectorEnv
 
 TRIES = 96
@@ -33,9 +36,13 @@ MORE_ERROR = 1.0
 """By which the tracking error may be larger than that of the PID, where the least help is looked for [deg]."""
 COLUMNS = (
     "seed", "ability", "repetitions", "pid_return", "shared_return", "best_return", "pid_share", "shared_share",
-    "best_share", "least_share", "pid_rms_deg", "best_rms_deg", "pid_effort", "best_effort",
+    "best_share", "least_share", "share_bound", "pid_rms_deg", "best_rms_deg", "pid_effort", "best_effort",
 )  # fmt: skip
-"""Of a patient and a number of repetitions; efforts are means over the last one."""
+"""Of a patient and a number of repetitions; efforts are means over the last one.
+
+`least_share` is the least of the schedules with an error of at most MORE_ERROR above the PID's; no device whatsoever
+comes below `share_bound` with such an error.
+"""
 
 
 def schedules(generator: np.random.Generator) -> np.ndarray:
@@ -62,6 +69,9 @@ class Tried:
     effort: np.ndarray
     steps: int
     """In a repetition."""
+    episode: Episode
+    error: np.ndarray
+    """psi - theta of the PID at the control times [rad]."""
 
     def row(self, shared: int, n: int) -> dict[str, float]:
         """Of the first n repetitions; `shared` is the best schedule of all patients."""
@@ -69,9 +79,12 @@ class Tried:
         share, rms = works[0] / works.sum(axis=0), np.sqrt(self.square[:n].mean(axis=0) / self.steps)
         best, effort = int(np.argmax(returns)), self.effort[n - 1] / self.steps
         least = share[rms <= rms[0] + MORE_ERROR].min()
+        period = float(self.episode.times[1])
+        more = most_work(self.episode, self.error[: n * self.steps], np.radians(rms[0] + MORE_ERROR))
+        bound = max(share[0] - more / (works[:, 0].sum() * period), 0.0)
         return dict(zip(COLUMNS, (
             self.seed, self.ability, n, returns[0], returns[shared], returns[best], share[0], share[shared],
-            share[best], least, rms[0], rms[best], effort[0], effort[best],
+            share[best], least, bound, rms[0], rms[best], effort[0], effort[best],
         ), strict=True))  # fmt: skip
 
 
@@ -83,8 +96,9 @@ def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> Tried:
     n = movement.count
     shape, up, steps = (n, TRIES), movement.rest + movement.duration, len(times) // n
     found = Tried(
-        seed, episode.need.ability, np.zeros(shape), np.zeros(shape), np.zeros((2, *shape)), np.zeros(shape), steps
-    )
+        seed, episode.need.ability, np.zeros(shape), np.zeros(shape), np.zeros((2, *shape)), np.zeros(shape), steps,
+        episode, np.zeros(len(times)),
+    )  # fmt: skip
     for step, time in enumerate(times):
         k = min(step // steps, n - 1)
         authority, lag = tried[:, 0:2].T if time - k * steps * period < up else tried[:, 2:4].T
@@ -94,6 +108,7 @@ def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> Tried:
             raise SimulationError(f"a schedule ended the episode of seed {seed} at {time:.2f} s; none should.")
         r = np.array([env.packed.values.reading for env in worlds.envs])
         found.returns[k] += rewards
+        found.error[step] = -worlds.envs[0].packed.values.reading[READING.error]
         found.square[k] += told["tracking_error_deg"] ** 2
         found.effort[k] += told["effort"]
         found.works[0, k] += np.maximum(r[:, READING.exo_moment] * r[:, READING.hinge_rate], 0.0)

@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from dms_core.errors import DmsError
+from exo_env.panels import PICTURES
 
 Colour = tuple[int, int, int]
 Alignment = Literal["left", "centre", "right"]
@@ -41,8 +42,7 @@ def import_pygame() -> Any:
         import pygame
         import pygame.font
     except ImportError:
-        hint = 'pip install -c constraints.txt -e ".[pictures]"'
-        raise DmsError(f"rendering needs pygame-ce; install it with: {hint}") from None
+        raise DmsError(f"rendering needs pygame-ce. {PICTURES}") from None
     finally:
         if before is None:
             del os.environ[PROMPT]

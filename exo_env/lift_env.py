@@ -167,6 +167,10 @@ class ElbowLiftEnv(gymnasium.Env):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = choices(self.metadata["render_modes"])
             raise InputError(f"render_mode = {render_mode!r}; one of {modes} is wanted, or None.")
+        if render_mode is not None:
+            from exo_env.canvas import import_pygame
+
+            import_pygame()
         if type(repetitions) is not int or not 1 <= repetitions <= MOST_REPETITIONS:
             raise InputError(f"repetitions = {repetitions!r}; a whole number from 1 to {MOST_REPETITIONS} is wanted.")
         for name, value, low, high in (

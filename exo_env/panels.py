@@ -14,6 +14,10 @@ RESOLUTION = 150
 """[dots per inch]"""
 
 
+PICTURES = 'The extra "pictures" has it: in a checkout, pip install -c constraints.txt -e ".[pictures]"'
+"""What to do where a package for pictures is missing."""
+
+
 def require_matplotlib() -> None:
     """Say so before a long run where a figure could not be drawn.
 
@@ -23,8 +27,7 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        hint = 'pip install -c constraints.txt -e ".[pictures]"'
-        raise DmsError(f"figures need matplotlib; install it with: {hint}") from None
+        raise DmsError(f"figures need matplotlib. {PICTURES}") from None
 
 
 def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:

@@ -86,7 +86,7 @@ class Readout:
             "load": e.load,
             "ability": e.need.ability,
             "reference": dict(zip(MOVED, e.movement.tolist(), strict=False)),
-            "initial_angle_deg": math.degrees(e.start),
+            "initial_angle_deg": round(math.degrees(e.start), 10),
         }
 
     def info(self, weights: dict[str, float], happened: str | None) -> dict[str, Any]:
