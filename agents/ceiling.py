@@ -80,8 +80,9 @@ class Tried:
         best, effort = int(np.argmax(returns)), self.effort[n - 1] / self.steps
         least = share[rms <= rms[0] + MORE_ERROR].min()
         period = float(self.episode.times[1])
-        more = most_work(self.episode, self.error[: n * self.steps], np.radians(rms[0] + MORE_ERROR))
-        bound = max(share[0] - more / (works[:, 0].sum() * period), 0.0)
+        own, total = works[1, 0] * period, works[:, 0].sum() * period
+        most = most_work(self.episode, self.error[: n * self.steps], own, np.radians(rms[0] + MORE_ERROR))
+        bound = max(1.0 - most / total, 0.0)
         return dict(zip(COLUMNS, (
             self.seed, self.ability, n, returns[0], returns[shared], returns[best], share[0], share[shared],
             share[best], least, bound, rms[0], rms[best], effort[0], effort[best],

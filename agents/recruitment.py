@@ -11,8 +11,10 @@ over the time T is R, the one in proportion to k adds most (Cauchy and Schwarz):
 
     W <= R sqrt(T) |k| - integral of k e_0 dt,   |k|^2 = integral of k^2 dt
 
-Delays, which move k by less than 0.3 s, and passive moments of muscles are left out. What device and patient do
-together is taken as given, since the movement is.
+Nor does a patient do more than the largest static moment that can be wanted does along the movement (need.py).
+
+Delays, which move k by less than 0.3 s, and passive moments of muscles are left out, and the work of device and patient
+together is taken as given, since the movement is: the bound is known to a hundredth of that work.
 """
 
 from __future__ import annotations
@@ -22,24 +24,32 @@ import numpy as np
 from exo_env.episode import Episode
 from exo_env.human import FLEXORS, MUSCLES
 from exo_env.motor_command import InternalModel
+from exo_env.need import voluntary_moment
 from exo_env.patient import Patient
 
 
-def most_work(episode: Episode, error: np.ndarray, rms: float) -> float:
-    """Largest work that an error can add to that of a run [J].
+def most_work(episode: Episode, error: np.ndarray, done: float, rms: float) -> float:
+    """Largest positive work of the patient with errors of some size [J].
 
     Args:
-        episode: of the run.
+        episode: of a run.
         error: psi - theta of the run at the first n control times [rad], shape (n,).
-        rms: root mean square of the errors that are compared [rad].
+        done: positive work of the patient in the run until then [J].
+        rms: root mean square of the errors that are allowed [rad].
     """
     n, period = len(error), float(episode.times[1] - episode.times[0])
-    k = recruited(episode.patient, *powers(episode, n), period)
-    return rms * np.sqrt(n * period * float(k @ k) * period) - float(k @ error) * period
+    planned, full, voluntary = powers(episode, n)
+    k = recruited(episode.patient, planned, full, period)
+    added = rms * np.sqrt(n * period * float(k @ k) * period) - float(k @ error) * period
+    return max(done, min(done + added, float(voluntary.sum()) * period))
 
 
-def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Power of the planned moment, and of all flexors at full activation, where positive [W], each of shape (n,)."""
+def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Power of the planned moment, of all flexors at full activation, and of the largest moment that can be wanted.
+
+    Returns:
+        Each where it is positive [W], shape (n,).
+    """
     patient, machine = episode.patient, episode.ecosystem.machine
     assert machine is not None
     known = InternalModel.of(episode.arm, machine, patient.expected_load * episode.load)
@@ -47,7 +57,8 @@ def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray]:
     full = np.array([1.0 if m in FLEXORS else 0.01 for m in MUSCLES])
     planned = np.array([known.moment(*x) for x in zip(psi, rate, acceleration, strict=True)])
     largest = np.array([known.muscle_moment(x, full) for x in psi])
-    return np.maximum(planned * rate, 0.0), np.maximum(largest * rate, 0.0)
+    wanted = np.array([voluntary_moment(patient, known, x) for x in psi])
+    return np.maximum(planned * rate, 0.0), np.maximum(largest * rate, 0.0), np.maximum(wanted * rate, 0.0)
 
 
 def recruited(patient: Patient, planned: np.ndarray, full: np.ndarray, period: float) -> np.ndarray:

@@ -58,15 +58,25 @@ def test_a_device_recruits_less(lag_deg):
 
     error, alone = run(0.0)
     later, more = run(lag_deg)
-    bound = most_work(env.episode, error, float(np.sqrt(np.mean(later**2))))
+    bound = most_work(env.episode, error, alone, float(np.sqrt(np.mean(later**2)))) - alone
     assert 0.1 * bound < more - alone < bound
+
+
+def test_who_is_weak_does_no_more_than_can_be_wanted():
+    env = ElbowLiftEnv(action_mode="pid_setpoint", patient="healthy")
+    weak = {**PATIENT.model_dump(), "maximum_activation_flexors": 0.1}
+    env.reset(seed=1, options={"patient": weak})
+    n = len(env.episode.course)
+    most = powers(env.episode, n)[2].sum() * env.period
+    assert most_work(env.episode, np.zeros(n), 0.0, 1.0) == pytest.approx(most)
+    assert most_work(env.episode, np.zeros(n), 0.0, 1e-4) < most
 
 
 def test_powers_are_those_of_the_lift():
     env = ElbowLiftEnv(action_mode="pid_setpoint", patient="healthy")
     env.reset(seed=1)
     rate = env.episode.course[:, 1]
-    planned, full = powers(env.episode, len(rate))
+    planned, full, _ = powers(env.episode, len(rate))
     lifting = rate > 0.0
     assert (planned[~lifting] == 0.0).all() and (planned >= 0.0).all()
     assert (full[lifting] > planned[lifting]).all()
