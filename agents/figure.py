@@ -1,4 +1,4 @@
-"""The figure of an evaluation: a panel a measure, a row a policy, each patient a dot, estimate and interval above."""
+"""The figure of an evaluation: a panel a measure, a row a policy, each episode a dot, estimate and interval above."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from agents.measures import MEASURES
+from agents.tables import heading, statistic
 from exo_env.panels import panels, save
 
 COLUMNS = 3
@@ -27,12 +28,13 @@ def draw(path: Path, results: dict[str, Any]) -> None:
         ax.set_yticks(range(len(names)), [results["policies"][n]["title"] for n in names])
         ax.set_ylim(len(names) - 0.5, -0.5)
         ax.grid(False, axis="y")
+        if m.unit == "deg":
+            # An arm without help is off by a hundred times the error of a good device.
+            ax.set_xscale("log")
+            ax.xaxis.set_major_formatter("{x:g}")
     for ax in list(axes.flat)[len(MEASURES) :]:
         ax.set_visible(False)
-    n, percent = results["patients"], 100.0 * results["confidence"]
-    figure.suptitle(
-        f"{results['population']}: {n} patients, interquartile mean and {percent:g} % interval", fontsize=10
-    )
+    figure.suptitle(f"{heading(results)}\n{statistic(results)}", fontsize=9)
     save(figure, path)
 
 
@@ -40,7 +42,7 @@ def _row(ax: Any, k: int, found: dict[str, Any], measure: str) -> None:
     """Patients and estimate of one policy."""
     values = np.array([e["measures"][measure] for e in found["episodes"]])
     colour, e = COLOURS[k % len(COLOURS)], found["summary"][measure]
-    # Dots beside each other, in the order of the patients.
+    # Dots beside each other, in the order of the episodes.
     ax.plot(values, k + np.linspace(-0.25, 0.25, len(values)), ".", color=colour, alpha=0.35, markersize=4)
     ax.plot([e["low"], e["high"]], [k, k], color=colour, linewidth=2.0)
     ax.plot([e["value"]], [k], "o", color=colour, markersize=6, markeredgecolor="white")

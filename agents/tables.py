@@ -28,7 +28,7 @@ def statistic(results: Mapping[str, Any]) -> str:
 def heading(results: Mapping[str, Any]) -> str:
     """Whom a table is about."""
     often, loads = results.get("settings", {}).get("repetitions", 1), results.get("loads", ())
-    said = f"{results['patients']} patients, {results['population']}, seed {results['seed']}"
+    said = f"{results['patients']} patients of '{results['population']}', seed {results['seed']}"
     said += f", loads {' '.join(f'{x:g}' for x in loads)} kg" if loads else ""
     return said + (f", {often} repetitions" if often > 1 else "")
 
