@@ -41,8 +41,11 @@ NOT_GIVEN = (
 STATE_DEPENDENT = {"use_sde", "sde_sample_freq"}
 SCHEDULE = re.compile(r"lin_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """A value that falls linearly from this one to 0 at the end of the training."""
-SMALL = 0.01
-"""Share that is left of the weights of an output layer: Stable-Baselines3's gain for those of PPO."""
+SQUASHED = ("sac", "tqc")
+"""Those whose actions are the tanh of what their networks say."""
+SMALL, NEARLY_ALL = 0.01, 0.99
+"""Share that is left of the weights of an output layer, Stable-Baselines3's gain for those of PPO; and the largest
+action at which a tanh is not yet so flat that nothing is learned."""
 SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
 """Arguments that lie from 0 to 1, and above 0."""
 
@@ -67,15 +70,17 @@ def arguments(config: Config) -> dict[str, Any]:
     name, algorithm = config.training.algorithm, find(config.training.algorithm)
     if config.policy not in policies(name):
         raise InputError(f"policy = '{config.policy}'; {name} takes {choices(policies(name))}.")
-    start = config.training.start
-    if start is not None and name in ("sac", "tqc") and max(map(abs, start)) == 1.0:
-        raise InputError(f"training.start = {list(start)}; actions of {name} never reach -1 or 1, give less.")
+    start, squashed = config.training.start, name in SQUASHED
+    if start is not None and squashed and max(map(abs, start)) > NEARLY_ALL:
+        raise InputError(f"training.start = {list(start)}; {name} takes from {-NEARLY_ALL} to {NEARLY_ALL}.")
     if config.training.critic and (name, config.policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
         raise InputError("training.critic is for the MlpPolicy of ppo, without frame_stack.")
     _check(name, config.arguments, allowed(algorithm), OURS)
     _check_ranges(name, config.arguments)
     given = config.arguments.get("policy_kwargs", {})
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
+    if squashed and start is None and "log_std_init" in given:
+        raise InputError(f"{name}: policy_kwargs: log_std_init does nothing without training.start.")
     found = {k: _scheduled(v) for k, v in config.arguments.items()}
     if given:
         found["policy_kwargs"] = {k: activation(v) if k == "activation_fn" else v for k, v in given.items()}
@@ -132,13 +137,14 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
 def _begin_at(policy: Any, action: torch.Tensor) -> None:
     """Make an untrained policy act near an action.
 
-    Output layers of PPO begin with weights so small that their bias is what they say. Those of SAC and TQC do not, and
-    their noise covers the range; both are brought to what PPO begins with, the noise by `log_std_init`, which these
-    algorithms otherwise use for state-dependent exploration alone. It is that of the output before its tanh.
+    Output layers of PPO with `ortho_init` begin with weights so small that their bias is what they say. Others do not,
+    and the noise of SAC and TQC covers the range; they are brought to what PPO begins with. Their noise is that of
+    `log_std_init`, before the tanh, which they otherwise use for state-dependent exploration alone.
     """
     actor = getattr(policy, "actor", None)
     with torch.no_grad():
         if actor is None:
+            policy.action_net.weight *= 1.0 if policy.ortho_init else SMALL
             policy.action_net.bias[:] = action
             return
         for layer, bias in ((actor.mu, torch.atanh(action)), (actor.log_std, torch.tensor(actor.log_std_init))):

@@ -5,9 +5,9 @@
 A schedule is the device's PID with an authority and a setpoint below the reference, one pair until the arm is up and
 another one after, in every repetition the same. All schedules are tried on the same episode in one batch, and the best
 is picked with hindsight, which no policy has; beside it stands the schedule that is best for all patients together. It
-leaves out schedules that change more often, setpoints above the reference and antagonist ropes; what no device can do,
-whatever it is, with an error of that size is a bound (recruitment.py). What an episode of fewer repetitions gives is
-known from the same run, since an episode goes on as a shorter one ends.
+leaves out schedules that change more often, setpoints above the reference and antagonist ropes; what any device could
+recruit with errors of that size is estimated (recruitment.py). What an episode of fewer repetitions gives is known from
+the same run, since an episode goes on as a shorter one ends.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import tyro
 from tqdm import tqdm
 
 from agents.evaluate import patient_seeds
-from agents.recruitment import most_work
+from agents.recruitment import most_recruited
 from dms_core.errors import SimulationError
 from dms_core.output_file import check_writable, whole_file
 from exo_env.actions import PidSetpoint
@@ -36,12 +36,12 @@ MORE_ERROR = 1.0
 """By which the tracking error may be larger than that of the PID, where the least help is looked for [deg]."""
 COLUMNS = (
     "seed", "ability", "repetitions", "pid_return", "shared_return", "best_return", "pid_share", "shared_share",
-    "best_share", "least_share", "share_bound", "pid_rms_deg", "best_rms_deg", "pid_effort", "best_effort",
+    "best_share", "least_share", "linear_share", "pid_rms_deg", "best_rms_deg", "pid_effort", "best_effort",
 )  # fmt: skip
 """Of a patient and a number of repetitions; efforts are means over the last one.
 
-`least_share` is the least of the schedules with an error of at most MORE_ERROR above the PID's; no device whatsoever
-comes below `share_bound` with such an error.
+`least_share` is the least of the schedules with an error of at most MORE_ERROR above the PID's, `linear_share` what
+would be left if such errors recruited as much as they can and every bit of effort became work.
 """
 
 
@@ -79,14 +79,15 @@ class Tried:
         share, rms = works[0] / works.sum(axis=0), np.sqrt(self.square[:n].mean(axis=0) / self.steps)
         best, effort = int(np.argmax(returns)), self.effort[n - 1] / self.steps
         least = share[rms <= rms[0] + MORE_ERROR].min()
-        period = float(self.episode.times[1])
-        own, total = works[1, 0] * period, works[:, 0].sum() * period
-        most = most_work(self.episode, self.error[: n * self.steps], own, np.radians(rms[0] + MORE_ERROR))
-        bound = max(1.0 - most / total, 0.0)
-        return dict(zip(COLUMNS, (
-            self.seed, self.ability, n, returns[0], returns[shared], returns[best], share[0], share[shared],
-            share[best], least, bound, rms[0], rms[best], effort[0], effort[best],
-        ), strict=True))  # fmt: skip
+        errors = self.error[: n * self.steps], np.radians(rms[0] + MORE_ERROR)
+        linear = share[0] - most_recruited(self.episode, *errors) / (works[:, 0].sum() * self.episode.times[1])
+        return {
+            "seed": self.seed, "ability": self.ability, "repetitions": n, "pid_return": returns[0],
+            "shared_return": returns[shared], "best_return": returns[best], "pid_share": share[0],
+            "shared_share": share[shared], "best_share": share[best], "least_share": least,
+            "linear_share": max(linear, 0.0), "pid_rms_deg": rms[0], "best_rms_deg": rms[best],
+            "pid_effort": effort[0], "best_effort": effort[best],
+        }  # fmt: skip
 
 
 def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> Tried:
@@ -104,12 +105,12 @@ def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> Tried:
         k = min(step // steps, n - 1)
         authority, lag = tried[:, 0:2].T if time - k * steps * period < up else tried[:, 2:4].T
         actions = np.stack([-np.radians(lag) / PidSetpoint().setpoint_range, 2.0 * authority - 1.0], axis=1)
+        found.error[step] = -worlds.envs[0].packed.values.reading[READING.error]
         _, rewards, terminated, _, told = worlds.step(actions)
         if terminated.any():
             raise SimulationError(f"a schedule ended the episode of seed {seed} at {time:.2f} s; none should.")
         r = np.array([env.packed.values.reading for env in worlds.envs])
         found.returns[k] += rewards
-        found.error[step] = -worlds.envs[0].packed.values.reading[READING.error]
         found.square[k] += told["tracking_error_deg"] ** 2
         found.effort[k] += told["effort"]
         found.works[0, k] += np.maximum(r[:, READING.exo_moment] * r[:, READING.hinge_rate], 0.0)

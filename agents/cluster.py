@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from dms_core.errors import DmsError
+from dms_core.errors import DmsError, extra
 
 ROOT = Path(__file__).resolve().parents[1]
 RETRIES = 3
@@ -75,7 +75,7 @@ def _started(address: str | None, cpus: int | None) -> Any:
     try:
         import ray
     except ImportError:
-        raise DmsError('Ray is missing; install it with: pip install -c constraints.txt -e ".[sweep]"') from None
+        raise DmsError(f"Ray is missing. {extra('sweep')}") from None
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
     try:
         if address is None:

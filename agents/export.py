@@ -12,7 +12,7 @@ from tyro.conf import Positional
 
 from agents.learned import DESCRIPTION, LearnedPolicy
 from agents.run_folder import RECORD, RunFolder
-from dms_core.errors import DmsError, InputError
+from dms_core.errors import DmsError, InputError, extra
 from dms_core.output_file import check_writable
 
 ONNX = "policy.onnx"
@@ -59,7 +59,7 @@ def export(
 
         write_onnx(policy, out / ONNX)
     elif onnx:
-        print(f'{ONNX} is left out; it needs: pip install -c constraints.txt -e ".[export]"')
+        print(f"{ONNX} is left out; it needs the package onnx. {extra('export')}")
     d, which = policy.description, ""
     if (source / RECORD).is_file():
         which = "last checkpoint, " if last else "best on the patients set aside, "

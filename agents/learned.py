@@ -183,10 +183,8 @@ def repetitions_of(policies: Sequence[Policy], given: int | None = None) -> int:
     """
     if given is not None:
         return given
-    learned = {
-        p.name: int(p.description.env_kwargs.get("repetitions", 1)) for p in policies if isinstance(p, LearnedPolicy)
-    }
-    if len(set(learned.values())) > 1:
+    learned = {p.name: p.description.env_kwargs.get("repetitions", 1) for p in policies if isinstance(p, LearnedPolicy)}
+    if len({*learned.values()}) > 1:
         said = ", ".join(f"{name} with {often}" for name, often in learned.items())
         raise InputError(f"these policies were trained with different repetitions ({said}); give --repetitions.")
     return next(iter(learned.values()), 1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from agents.learned import LearnedPolicy
 from agents.network import Architecture
-from dms_core.errors import DmsError
+from dms_core.errors import DmsError, extra
 
 OPSET, IR_VERSION = 17, 9
 """Old enough for the runtimes of 2023 and later."""
@@ -29,9 +29,7 @@ def write_onnx(policy: LearnedPolicy, path: Path) -> None:
     try:
         import onnx
     except ImportError:
-        raise DmsError(
-            'ONNX needs the package onnx; install it with: pip install -c constraints.txt -e ".[export]"'
-        ) from None
+        raise DmsError(f"ONNX needs the package onnx. {extra('export')}") from None
     graph = _Graph(policy)
     model = onnx.helper.make_model(
         graph.made(), producer_name="exo_env", producer_version=policy.description.exo_env,

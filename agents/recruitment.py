@@ -1,68 +1,65 @@
-"""How much work an error can recruit at most, whatever a device does: a bound for the share that is left to it.
+"""How much work errors of a size can recruit from a patient: a linear estimate, whatever device makes the errors.
 
 Effort obeys s' = -rate (s - s_0) + recovery e (slacking.py), and beside it intention grows by feedback_gain e
-(effort.py). With p, the power of the planned moment, and g, that of all flexors at full activation, both where they are
-positive, the work W that an error e adds to a patient's work in a run with the error e_0 is at most
+(effort.py). With p, the power of the planned moment, and g, that of all flexors at full activation, both along the
+reference and where they are positive, an error e adds to the patient's work in a run with the error e_0
 
     W = integral of k (e - e_0) dt,   k(t) = feedback_gain g(t) + recovery integral of p(u) exp(-rate (u - t)) du, u > t
 
-since weakness, fatigue, co-contraction and effort's own limits only take away. Of all errors whose root mean square
-over the time T is R, the one in proportion to k adds most (Cauchy and Schwarz):
+Of all errors whose root mean square over the time T is R, the one in proportion to k adds most (Cauchy and Schwarz):
 
     W <= R sqrt(T) |k| - integral of k e_0 dt,   |k|^2 = integral of k^2 dt
 
-Nor does a patient do more than the largest static moment that can be wanted does along the movement (need.py).
-
-Delays, which move k by less than 0.3 s, and passive moments of muscles are left out, and the work of device and patient
-together is taken as given, since the movement is: the bound is known to a hundredth of that work.
+An estimate of what is possible and no bound. It is too high by what keeps effort from becoming work: weakness, fatigue,
+co-contraction, the limits of effort. It leaves out what changes work in other ways: errors that shorten the movement
+(1.5 deg at both ends are 6 % of a lift of 50 deg) or shake the arm, reflexes, delays (below 0.3 s), passive moments.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from exo_env.episode import Episode
 from exo_env.human import FLEXORS, MUSCLES
 from exo_env.motor_command import InternalModel
-from exo_env.need import voluntary_moment
 from exo_env.patient import Patient
 
 
-def most_work(episode: Episode, error: np.ndarray, done: float, rms: float) -> float:
-    """Largest positive work of the patient with errors of some size [J].
+def most_recruited(episode: Episode, error: np.ndarray, rms: float) -> float:
+    """Most work that errors of a size add to the patient's in a run [J].
 
     Args:
-        episode: of a run.
+        episode: of the run.
         error: psi - theta of the run at the first n control times [rad], shape (n,).
-        done: positive work of the patient in the run until then [J].
         rms: root mean square of the errors that are allowed [rad].
     """
-    n, period = len(error), float(episode.times[1] - episode.times[0])
-    planned, full, voluntary = powers(episode, n)
-    k = recruited(episode.patient, planned, full, period)
-    added = rms * np.sqrt(n * period * float(k @ k) * period) - float(k @ error) * period
-    return max(done, min(done + added, float(voluntary.sum()) * period))
+    n, period = len(error), float(episode.times[1])
+    return most_added(recruited(episode.patient, *powers(episode, n), period), error, rms, period)
 
 
-def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Power of the planned moment, of all flexors at full activation, and of the largest moment that can be wanted.
+def most_added(k: np.ndarray, error: np.ndarray, rms: float, period: float) -> float:
+    """R sqrt(T) |k| less the integral of k e_0 [J]; shapes (n,), units as in `recruited` and [rad]."""
+    return rms * math.sqrt(len(k) * period * float(k @ k) * period) - float(k @ error) * period
 
-    Returns:
-        Each where it is positive [W], shape (n,).
-    """
+
+def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Power of the planned moment, and of all flexors at full activation, where positive [W], each of shape (n,)."""
     patient, machine = episode.patient, episode.ecosystem.machine
     assert machine is not None
     known = InternalModel.of(episode.arm, machine, patient.expected_load * episode.load)
     psi, rate, acceleration = episode.course[:n].T
-    full = np.array([1.0 if m in FLEXORS else 0.01 for m in MUSCLES])
+    flexed = np.array([1.0 if m in FLEXORS else 0.01 for m in MUSCLES])
     planned = np.array([known.moment(*x) for x in zip(psi, rate, acceleration, strict=True)])
-    largest = np.array([known.muscle_moment(x, full) for x in psi])
-    wanted = np.array([voluntary_moment(patient, known, x) for x in psi])
-    return np.maximum(planned * rate, 0.0), np.maximum(largest * rate, 0.0), np.maximum(wanted * rate, 0.0)
+    full = np.array([known.muscle_moment(x, flexed) for x in psi])
+    return np.maximum(planned * rate, 0.0), np.maximum(full * rate, 0.0)
 
 
 def recruited(patient: Patient, planned: np.ndarray, full: np.ndarray, period: float) -> np.ndarray:
     """k: work that an error adds, by its size and the time that it lasts [J/(rad s)], shape (n,).
+
+    Exact for errors and powers that are constant over each period.
 
     Args:
         patient: who.
@@ -70,8 +67,10 @@ def recruited(patient: Patient, planned: np.ndarray, full: np.ndarray, period: f
         full: power of all flexors at full activation [W], shape (n,).
         period: between two times [s].
     """
-    kept, later, found = np.exp(-patient.slacking_rate * period), 0.0, np.empty(len(planned))
+    rate = patient.slacking_rate
+    kept, gained = math.exp(-rate * period), -math.expm1(-rate * period) / rate if rate > 0.0 else period
+    later, found = 0.0, np.empty(len(planned))
     for i in reversed(range(len(planned))):
-        later = later * kept + planned[i] * period
+        later = later * kept + planned[i] * gained
         found[i] = later
     return patient.effort_recovery * found + patient.feedback_gain * full

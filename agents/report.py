@@ -14,7 +14,7 @@ from agents.baselines import POLICIES
 from agents.config import Config
 from agents.courses import Course, course
 from agents.evaluate import able_ones, differences, summary
-from agents.learned import find_policy, shipped_policies
+from agents.learned import find_policy, repetitions_of, shipped_policies
 from agents.policy import Policy
 from agents.report_figures import Group
 from agents.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
@@ -55,7 +55,7 @@ def report(
         lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
     shown = _shown(policy_names, evaluations, trainings)
     if shown:
-        settings = evaluations[0].get("settings", {}) if evaluations else {}
+        settings = evaluations[0].get("settings", {}) if evaluations else {"repetitions": repetitions_of(shown)}
         lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed, settings)
     if shown and evaluations:
         lines += _worst(out, shown, evaluations[0])

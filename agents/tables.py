@@ -5,7 +5,8 @@ What is estimated is the interquartile mean over the patients; of differences an
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from agents.baselines import POLICIES
@@ -35,14 +36,15 @@ def heading(results: Mapping[str, Any]) -> str:
 
 def short_table(results: Mapping[str, Any]) -> str:
     """A row a policy: return, its difference to the first policy, tracking, device's share, unsafe episodes."""
-    policies: Mapping[str, Any] = results["policies"]
-    first = next(iter(policies))
-    rows = [["", "return", f"difference to {first}", "tracking, rms [deg]", "work of the device", "unsafe"]]
-    for name, p in policies.items():
-        found = {k: _cell(Estimate(**p["summary"][k])) for k in ("return", "tracking_rms_deg", "device_work_share")}
-        apart = "" if name == first else _cell(Estimate(**p["difference"]["return"]))
-        unsafe = f"{p['summary']['unsafe']['value']:.0%}"
-        rows.append([name, found["return"], apart, found["tracking_rms_deg"], found["device_work_share"], unsafe])
+    names, policies = _short_names(results["policies"]), list(results["policies"].values())
+    rows = [["", "return", f"difference to {names[0]}", "tracking, rms [deg]", "work of the device", "unsafe"]]
+    for name, p in zip(names, policies, strict=True):
+        shown = (p["summary"][k] for k in ("return", "tracking_rms_deg", "device_work_share"))
+        returned, tracking, share = (_cell(Estimate(**one)) for one in shown)
+        compared = "" if name == names[0] else _cell(Estimate(**p["difference"]["return"]))
+        # A percentage would round a single one away.
+        unsafe = f"{sum(e['measures']['unsafe'] for e in p['episodes']):.0f} of {len(p['episodes'])}"
+        rows.append([name, returned, compared, tracking, share, unsafe])
     if len(policies) == 1:
         rows = [[*row[:2], *row[3:]] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -52,6 +54,13 @@ def short_table(results: Mapping[str, Any]) -> str:
         )
         for row in rows
     )
+
+
+def _short_names(names: Iterable[str]) -> list[str]:
+    """Policies by name, trained ones by the last part of their folder where these differ."""
+    found = list(names)
+    short = [Path(name).name for name in found]
+    return short if len(set(short)) == len(found) else found
 
 
 def whole_table(results: Mapping[str, Any]) -> list[str]:
@@ -107,4 +116,9 @@ def best_baseline(policies: Mapping[str, Any]) -> str | None:
 def _cell(e: Estimate) -> str:
     """Value and interval; what is below `LEAST` is round-off, and 0."""
     value, low, high = (0.0 if abs(x) < LEAST else x for x in (e.value, e.low, e.high))
-    return f"{value:.3g} [{low:.3g}, {high:.3g}]"
+    return f"{_digits(value)} [{_digits(low)}, {_digits(high)}]"
+
+
+def _digits(x: float) -> str:
+    """Three digits, and all before the point."""
+    return f"{x:.0f}" if abs(x) >= 999.5 else f"{x:.3g}"

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from tqdm import tqdm
 from tyro.conf import arg
 
-from dms_core.errors import DmsError, InputError
+from dms_core.errors import DmsError, InputError, extra
 
 STOPPED = 130
 """Exit status of a run that was told to stop."""
@@ -66,9 +66,7 @@ def require_training() -> None:
         import stable_baselines3  # noqa: F401
         import tensorboard  # noqa: F401
     except ImportError as error:
-        raise DmsError(
-            f'training needs {error.name}; install it with: pip install -c constraints.txt -e ".[train]"'
-        ) from None
+        raise DmsError(f"training needs {error.name}. {extra('train')}") from None
 
 
 def _begun(config: Path | None, seed: int, changes: tuple[str, ...], out: Path | None, resume: Path | None) -> Any:

@@ -14,7 +14,7 @@ from tyro.conf import arg
 from agents.evaluate import world_of
 from agents.learned import find_policy, repetitions_of
 from agents.policy import Policy
-from dms_core.errors import DmsError, InputError
+from dms_core.errors import DmsError, InputError, extra
 from dms_core.output_file import check_writable
 from exo_env.population import population
 
@@ -131,9 +131,7 @@ def _possible(out: Path) -> Path:
     try:
         import imageio  # noqa: F401
     except ImportError:
-        raise DmsError(
-            'videos need imageio; install it with: pip install -c constraints.txt -e ".[pictures]"'
-        ) from None
+        raise DmsError(f"videos need imageio. {extra('pictures')}") from None
     if out.suffix == ".mp4":
         try:
             import imageio_ffmpeg

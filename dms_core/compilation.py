@@ -58,14 +58,14 @@ class _Announcer(event.Listener):
     """
 
     def __init__(self) -> None:
-        self._last = -math.inf
+        self._depth, self._ended = 0, -math.inf
 
     def on_start(self, event: event.Event) -> None:
         """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""
         if isinstance(event.data["dispatcher"]._cache, NullCache):
             return
-        quiet, self._last = time.monotonic() - self._last > QUIET, time.monotonic()
-        if quiet:
+        self._depth += 1
+        if self._depth == 1 and time.monotonic() - self._ended > QUIET:
             print(
                 "dms_core: compiling what is new, kept on disk (seconds; about a minute the very first time) ...",
                 file=sys.stderr,
@@ -73,8 +73,12 @@ class _Announcer(event.Listener):
             )
 
     def on_end(self, event: event.Event) -> None:
-        """The pause between two stretches of compiling begins."""
-        self._last = time.monotonic()
+        """The pause between two stretches of compiling begins where the outermost function is done."""
+        if isinstance(event.data["dispatcher"]._cache, NullCache):
+            return
+        self._depth -= 1
+        if self._depth == 0:
+            self._ended = time.monotonic()
 
 
 _announcer: _Announcer | None = None

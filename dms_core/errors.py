@@ -25,3 +25,8 @@ def choices(names) -> str:
     """A readable list of what would have been right."""
     names = sorted(names)
     return ", ".join(names) if names else "none are declared"
+
+
+def extra(name: str) -> str:
+    """What to do where a package of an optional extra is missing."""
+    return f'Install the extra "{name}"; in a checkout: pip install -c constraints.txt -e ".[{name}]"'

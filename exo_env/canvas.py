@@ -13,8 +13,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from dms_core.errors import DmsError
-from exo_env.panels import PICTURES
+from dms_core.errors import DmsError, extra
 
 Colour = tuple[int, int, int]
 Alignment = Literal["left", "centre", "right"]
@@ -42,7 +41,7 @@ def import_pygame() -> Any:
         import pygame
         import pygame.font
     except ImportError:
-        raise DmsError(f"rendering needs pygame-ce. {PICTURES}") from None
+        raise DmsError(f"rendering needs pygame-ce. {extra('pictures')}") from None
     finally:
         if before is None:
             del os.environ[PROMPT]

@@ -76,7 +76,7 @@ class Episode:
 
     @property
     def effort(self) -> float:
-        """Share of the command that the patient still intends: s [-]."""
+        """What the patient intends, as a multiple of what was planned: s [-]."""
         return float(self.rig.plant.effort[STATE.effort])
 
     @cached_property

@@ -7,15 +7,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from dms_core.errors import DmsError
+from dms_core.errors import DmsError, extra
 from dms_core.output_file import check_writable
 
 RESOLUTION = 150
 """[dots per inch]"""
-
-
-PICTURES = 'The extra "pictures" has it: in a checkout, pip install -c constraints.txt -e ".[pictures]"'
-"""What to do where a package for pictures is missing."""
 
 
 def require_matplotlib() -> None:
@@ -27,7 +23,7 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise DmsError(f"figures need matplotlib. {PICTURES}") from None
+        raise DmsError(f"figures need matplotlib. {extra('pictures')}") from None
 
 
 def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:

@@ -27,7 +27,7 @@ ACTIVATION: tuple[Colour, ...] = ((36, 88, 200), (146, 66, 158), (220, 28, 40))
 TENSION: tuple[Colour, ...] = ((196, 200, 206), (244, 180, 48), (190, 72, 0))
 """Of the device's ropes, from slack to FULL_TENSION and beyond: grey, yellow, brown."""
 FULL_TENSION = 200.0
-"""End of the scale of tensions [N], the same in all pictures: what holds 2 kg in a limp arm."""
+"""End of the scale of tensions [N], the same in all pictures: the largest of the action mode rope_tension."""
 WINDOW = 2.8
 """Side of the main view over the length of the upper arm [-]."""
 ELBOW_AT = (0.27, 0.47)

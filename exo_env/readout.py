@@ -86,6 +86,7 @@ class Readout:
             "load": e.load,
             "ability": e.need.ability,
             "reference": dict(zip(MOVED, e.movement.tolist(), strict=False)),
+            # Given in degrees, kept in radians: the way back leaves the last digit.
             "initial_angle_deg": round(math.degrees(e.start), 10),
         }
 

@@ -46,7 +46,7 @@ class Scene:
     device_moment: float
     """Of the device's ropes about its hinge, flexion positive [Nm]."""
     effort: float
-    """Share of what was planned that the patient still intends [-]."""
+    """What the patient intends, as a multiple of what was planned [-]."""
     label: str = ""
     """Names the patient."""
     weight: np.ndarray | None = None

@@ -9,10 +9,11 @@ import pytest
 from agents.__main__ import main
 from agents.baselines import POLICIES, policy
 from agents.evaluate import by_patient, evaluate, patient_seeds
-from agents.learned import shipped_policies
+from agents.learned import LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from agents.measures import MEASURES
 from agents.statistics import interquartile_mean
 from agents.tables import short_table, whole_table
+from dms_core.errors import InputError
 
 SHORT = {"episode_duration": 0.6}
 """Until the lift has begun; a whole episode tells no more and takes ten times as long."""
@@ -71,9 +72,35 @@ def test_what_is_printed_fits_a_terminal():
     head, *rows = short_table(found).splitlines()
     assert [row.split()[0] for row in rows] == list(POLICIES) and "difference to" in head
     assert max(map(len, [head, *rows])) <= 120
+    # Longer names than those of baselines: the last part of a folder, where these differ.
+    found["policies"] = {f"out/some/long/folder/{name}": p for name, p in found["policies"].items()}
+    assert short_table(found) == "\n".join([head, *rows])
+    found["policies"] = {name.rpartition("/")[2]: p for name, p in found["policies"].items()}
     first, other = (found["policies"][name] for name in list(POLICIES)[:2])
     expected = np.mean(by_patient(other["episodes"], "return") - by_patient(first["episodes"], "return"))
     assert f"{expected:.3g} [" in rows[1] and "difference" not in short_table(run(["pid"]))
+
+
+def test_a_single_unsafe_episode_and_large_numbers_are_not_rounded_away():
+    found = run(["pid"])
+    p = found["policies"]["pid"]
+    p["episodes"] *= 300
+    p["episodes"][7] = {**p["episodes"][7], "measures": {**p["episodes"][7]["measures"], "unsafe": 1.0}}
+    p["summary"]["return"] |= {"value": 1234.6, "low": 999.6, "high": 12345.0}
+    said = short_table(found)
+    assert "1 of 600" in said and "1235 [1000, 12345]" in said
+
+
+def test_repetitions_are_those_that_were_learned_with(tmp_path):
+    learned = find_policy("learned")
+    folder = tmp_path / "one"
+    found = learned.description.model_copy(update={"env_kwargs": {}})
+    LearnedPolicy(found, learned.arrays).save(folder)
+    one = find_policy(str(folder))
+    assert repetitions_of([policy("pid")]) == 1 and repetitions_of([policy("pid"), learned]) == 3
+    assert repetitions_of([one, policy("pid")]) == 1 and repetitions_of([one, learned], 2) == 2
+    with pytest.raises(InputError, match=r"learned with 3, .*one with 1\); give --repetitions"):
+        repetitions_of([learned, one])
 
 
 def test_order_of_policies_does_not_matter():

@@ -237,7 +237,7 @@ def test_mistakes_are_one_message(said, arguments, tmp_path, capsys, monkeypatch
 def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(sys.modules, "sb3_contrib", None)
     assert train("--config", config_file(tmp_path)) == 2
-    wanted = 'training needs sb3_contrib; install it with: pip install -c constraints.txt -e ".[train]"'
+    wanted = 'training needs sb3_contrib. Install the extra "train"; in a checkout: pip install -c constraints.txt'
     assert wanted in capsys.readouterr().err
 
 
