@@ -93,7 +93,9 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
         other.locator_params(axis="x", nbins=6)
         other.set_xlabel("share of the device: difference [-]")
         other.set_ylabel("tracking error, rms: difference [deg]")
-        other.set_title(f"mean difference to {policies[0]['title']}, patient by patient", fontsize=9)
+        left_out = [p["title"] for p in policies if p not in near]
+        said = f"mean difference to {policies[0]['title']}, patient by patient"
+        other.set_title(said + (f"\n(far off: {', '.join(left_out)})" if left_out else ""), fontsize=9)
     percent = 100.0 * results["confidence"]
     figure.supxlabel(f"{results['patients']} patients, {results['population']}; {percent:g} % intervals", fontsize=9)
     legend(figure, ax, 3)

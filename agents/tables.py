@@ -29,7 +29,8 @@ def statistic(results: Mapping[str, Any]) -> str:
 def heading(results: Mapping[str, Any]) -> str:
     """Whom a table is about."""
     often, loads = results.get("settings", {}).get("repetitions", 1), results.get("loads", ())
-    said = f"{results['patients']} patients of '{results['population']}', seed {results['seed']}"
+    count = results["patients"]
+    said = f"{count} patient{'s' * (count > 1)} of '{results['population']}', seed {results['seed']}"
     said += f", loads {' '.join(f'{x:g}' for x in loads)} kg" if loads else ""
     return said + (f", {often} repetitions" if often > 1 else "")
 
@@ -37,7 +38,7 @@ def heading(results: Mapping[str, Any]) -> str:
 def short_table(results: Mapping[str, Any]) -> str:
     """A row a policy: return, its difference to the first policy, tracking, device's share, unsafe episodes."""
     names, policies = _short_names(results["policies"]), list(results["policies"].values())
-    rows = [["", "return", f"difference to {names[0]}", "tracking, rms [deg]", "work of the device", "unsafe"]]
+    rows = [["", "return", f"difference to {names[0]}", "tracking, rms [deg]", "device's share of work", "unsafe"]]
     for name, p in zip(names, policies, strict=True):
         shown = (p["summary"][k] for k in ("return", "tracking_rms_deg", "device_work_share"))
         returned, tracking, share = (_cell(Estimate(**one)) for one in shown)

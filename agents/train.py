@@ -14,6 +14,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecNormalize
 
 from agents.algorithms import arguments, build
@@ -70,6 +71,15 @@ class TrainingRun:
     def steps(self) -> int:
         """Environment steps done."""
         return self.model.num_timesteps
+
+    @property
+    def end(self) -> int:
+        """Steps after which training ends: whole rounds between two updates of the networks."""
+        one: Any = self.model
+        on_policy = isinstance(one, OnPolicyAlgorithm)
+        size = one.n_envs * (one.n_steps if on_policy else one.train_freq.frequency)
+        left = max(self.config.n_timesteps - self.steps, 0)
+        return self.steps + -(-left // size) * size
 
     def run(self) -> bool:
         """Train to the end, or until told to stop; returns whether it came to the end.

@@ -43,16 +43,25 @@ def train(
         folder, used, seed = _begun(config, seed, changes, out, resume)
         with folder.locked(), _bar(used.n_timesteps) as report:
             run = TrainingRun(folder, used, seed, report, stop)
-            if resume is not None:
-                report(run.steps, f"going on after {run.steps} of {used.n_timesteps} steps")
+            report(run.steps, _outlook(run.steps, run.end, used.n_timesteps))
             done = run.run()
     if not done:
-        print(f"stopped after {run.steps} steps; go on with: python -m agents train --resume {folder.path}")
+        said = f"stopped after {run.steps} steps, an unfinished round is dropped"
+        print(f"{said}; go on with: python -m agents train --resume {folder.path}")
         return STOPPED
     best = max(run.evaluations, key=lambda e: e["return"])
     print(f"{run.steps} steps in {run.seconds:.0f} s; best return {best['return']:.5g} after {best['steps']} steps")
     print(f"written: {folder.path}")
     return 0
+
+
+def _outlook(steps: int, end: int, wanted: int) -> str | None:
+    """What is ahead, where it is not just as wanted."""
+    if steps >= wanted:
+        return f"already complete: {steps} of {wanted} steps; give more with --set n_timesteps=..."
+    said = [f"going on after {steps} steps"] if steps else []
+    said += [f"whole rounds end after {end} steps, not {wanted}"] if end > wanted else []
+    return "; ".join(said) or None
 
 
 def require_training() -> None:

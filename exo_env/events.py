@@ -70,7 +70,7 @@ def event(code: int, limits: Limits, angle: float, tension: float, reaction: flo
     """
     if code == ANGLE:
         low, high = limits.lowest_deg, limits.highest_deg
-        return f"The elbow is at {math.degrees(angle):.4g} deg, outside {low:g} to {high:g} deg."
+        return f"The elbow is at {math.degrees(angle):.2f} deg, outside {low:g} to {high:g} deg."
     if code == TENSION:
         return f"A rope pulls with {tension:.0f} N; {limits.tension:g} N is the limit."
     return f"The elbow's reaction force is {reaction:.0f} N; {limits.reaction:g} N is the limit."

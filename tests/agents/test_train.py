@@ -234,6 +234,19 @@ def test_mistakes_are_one_message(said, arguments, tmp_path, capsys, monkeypatch
     assert said in errors and errors.startswith("error: ") and errors.count("\n") == 1
 
 
+def test_what_is_ahead_is_said_where_it_is_not_what_was_asked_for(tmp_path, capsys):
+    """Rounds have 2 times 16 steps."""
+    path, out = config_file(tmp_path), tmp_path / "run"
+    assert train("--config", path, "--out", out, "--set", "n_timesteps=40") == 0
+    printed = capsys.readouterr().out
+    assert "whole rounds end after 64 steps, not 40" in printed and "64 steps in" in printed
+    assert train("--resume", out) == 0
+    assert "already complete: 64 of 40 steps" in capsys.readouterr().out
+    assert train("--resume", out, "--set", "n_timesteps=96") == 0
+    printed = capsys.readouterr().out
+    assert "going on after 64 steps" in printed and "whole rounds" not in printed and "96 steps in" in printed
+
+
 def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(sys.modules, "sb3_contrib", None)
     assert train("--config", config_file(tmp_path)) == 2

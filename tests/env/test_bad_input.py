@@ -115,6 +115,15 @@ def test_a_population_file_with_a_wrong_value(tmp_path):
         ElbowLiftEnv(patient=str(path))
 
 
+def test_a_first_reset_that_is_refused_leaves_the_made_environment_usable():
+    env = gymnasium.make("exo_env:exo/ElbowLift-v0")
+    with pytest.raises(InputError, match="foo"):
+        env.reset(seed=0, options={"foo": 1})
+    env.reset(seed=0)
+    assert np.isfinite(env.step(np.zeros(2, np.float32))[0]).all()
+    env.close()
+
+
 @pytest.mark.parametrize("options", [3, [{"load": 1.0}], "load"])
 def test_options_that_are_no_mapping_are_refused(options):
     env, batch = ElbowLiftEnv(), ElbowLiftVectorEnv(2)
