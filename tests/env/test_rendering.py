@@ -34,3 +34,13 @@ def test_the_picture_follows_the_arm(env):
     for _ in range(40):
         env.step(np.array([0.5, 1.0], np.float32))
     assert np.mean(np.any(env.render() != before, axis=-1)) > 0.02, "a moved forearm changes many pixels"
+
+
+def test_a_scene_holds_who_does_how_much(env):
+    env.reset(seed=3)
+    env.step(np.zeros(2, np.float32))
+    world = env.unwrapped
+    scene, r = world.scene(), world.readings()
+    assert (scene.muscle_moment, scene.device_moment) == (r["muscle_moment"], r["exo_moment"])
+    assert scene.effort == r["effort"] and scene.error_deg == pytest.approx(np.degrees(r["tracking_error"]))
+    assert [tension for _, tension in scene.ropes] == [r["agonist_tension"], r["antagonist_tension"]]
