@@ -20,7 +20,7 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from agents.evaluate import patient_seeds
+from agents.evaluate import check_numbers, patient_seeds
 from agents.recruitment import most_recruited
 from dms_core.errors import SimulationError
 from dms_core.output_file import check_writable, whole_file
@@ -34,15 +34,6 @@ LARGEST_LAG = 3.0
 """[deg]"""
 MORE_ERROR = 1.0
 """By which the tracking error may be larger than that of the PID, where the least help is looked for [deg]."""
-COLUMNS = (
-    "seed", "ability", "repetitions", "pid_return", "shared_return", "best_return", "pid_share", "shared_share",
-    "best_share", "least_share", "linear_share", "pid_rms_deg", "best_rms_deg", "pid_effort", "best_effort",
-)  # fmt: skip
-"""Of a patient and a number of repetitions; efforts are means over the last one.
-
-`least_share` is the least of the schedules with an error of at most MORE_ERROR above the PID's, `linear_share` what
-would be left if such errors recruited as much as they can and every bit of effort became work.
-"""
 
 
 def schedules(generator: np.random.Generator) -> np.ndarray:
@@ -74,7 +65,11 @@ class Tried:
     """psi - theta of the PID at the control times [rad]."""
 
     def row(self, shared: int, n: int) -> dict[str, float]:
-        """Of the first n repetitions; `shared` is the best schedule of all patients."""
+        """Of the first n repetitions, efforts of the last one; `shared` is the best schedule of all patients.
+
+        `least_share` is the least of the schedules with an error of at most MORE_ERROR above the PID's, `linear_share`
+        what would be left if such errors recruited as much as they can and every bit of effort became work.
+        """
         returns, works = self.returns[:n].sum(axis=0), self.works[:, :n].sum(axis=1)
         share, rms = works[0] / works.sum(axis=0), np.sqrt(self.square[:n].mean(axis=0) / self.steps)
         best, effort = int(np.argmax(returns)), self.effort[n - 1] / self.steps
@@ -128,6 +123,7 @@ def ceiling(out: Path, population: str = "evaluation", patients: int = 24, repet
         repetitions: of the movement in an episode.
         seed: of the patients.
     """
+    check_numbers(patients, seed)
     check_writable(out)
     worlds = ElbowLiftVectorEnv(
         TRIES, action_mode="pid_setpoint", patient=population, repetitions=repetitions, autoreset_mode="Disabled"
@@ -142,12 +138,16 @@ def ceiling(out: Path, population: str = "evaluation", patients: int = 24, repet
     options = f"--population {population} --patients {patients} --repetitions {repetitions} --seed {seed}"
     with whole_file(out) as file:
         file.write(f"# python -m agents.ceiling {options}\n")
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()
         whole = ("seed", "repetitions")
         writer.writerows({k: v if k in whole else f"{v:.4g}" for k, v in row.items()} for row in rows)
     for n, best in zip(counts, shared, strict=True):
-        means = {c: float(np.mean([row[c] for row in rows if row["repetitions"] == n])) for c in COLUMNS[3:]}
+        means = {
+            c: float(np.mean([row[c] for row in rows if row["repetitions"] == n]))
+            for c in rows[0]
+            if c not in ("seed", "ability", "repetitions")
+        }
         print(f"{patients} patients of '{population}', {n} repetitions, shared schedule {tried[best].round(2)}, means:")
         print("  " + ", ".join(f"{k} {v:.3g}" for k, v in means.items()))
 

@@ -186,7 +186,10 @@ def repetitions_of(policies: Sequence[Policy], given: int | None = None) -> int:
     learned = {p.name: p.description.env_kwargs.get("repetitions", 1) for p in policies if isinstance(p, LearnedPolicy)}
     if len({*learned.values()}) > 1:
         said = ", ".join(f"{name} with {often}" for name, often in learned.items())
-        raise InputError(f"these policies were trained with different repetitions ({said}); give --repetitions.")
+        raise InputError(
+            f"these policies were trained with different repetitions ({said}); give --repetitions, and to a report an "
+            "evaluation of both."
+        )
     return next(iter(learned.values()), 1)
 
 

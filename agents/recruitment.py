@@ -21,8 +21,10 @@ import math
 
 import numpy as np
 
+from dms_core.model.muscles.activation import MINIMUM
+from exo_env.command_kernel import needed_moments
+from exo_env.effort import SIGN
 from exo_env.episode import Episode
-from exo_env.human import FLEXORS, MUSCLES
 from exo_env.motor_command import InternalModel
 from exo_env.patient import Patient
 
@@ -49,10 +51,10 @@ def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray]:
     patient, machine = episode.patient, episode.ecosystem.machine
     assert machine is not None
     known = InternalModel.of(episode.arm, machine, patient.expected_load * episode.load)
-    psi, rate, acceleration = episode.course[:n].T
-    flexed = np.array([1.0 if m in FLEXORS else 0.01 for m in MUSCLES])
-    planned = np.array([known.moment(*x) for x in zip(psi, rate, acceleration, strict=True)])
-    full = np.array([known.muscle_moment(x, flexed) for x in psi])
+    course, planned = episode.course[:n], np.empty(n)
+    needed_moments(known.arm, known.load, course, planned)
+    flexed = np.where(np.array(SIGN) > 0.0, 1.0, MINIMUM)
+    rate, full = course[:, 1], np.array([known.muscle_moment(psi, flexed) for psi in course[:, 0]])
     return np.maximum(planned * rate, 0.0), np.maximum(full * rate, 0.0)
 
 

@@ -32,8 +32,8 @@ from dms_core.errors import DmsError, InputError
 from dms_core.output_file import write_json
 
 STATE = "state.json"
-Report = Callable[[int, dict[str, Any] | str | None], None]
-"""Called with the steps done, and with an evaluation or a sentence where there is a new one."""
+Report = Callable[[int, dict[str, Any] | None], None]
+"""Called with the steps done, and with an evaluation where there is a new one."""
 
 
 class TrainingRun:

@@ -43,7 +43,8 @@ def train(
         folder, used, seed = _begun(config, seed, changes, out, resume)
         with folder.locked(), _bar(used.n_timesteps) as report:
             run = TrainingRun(folder, used, seed, report, stop)
-            report(run.steps, _outlook(run.steps, run.end, used.n_timesteps))
+            for said in _outlook(run.steps, run.end, used.n_timesteps):
+                tqdm.write(said)
             done = run.run()
     if not done:
         said = f"stopped after {run.steps} steps, an unfinished round is dropped"
@@ -55,13 +56,15 @@ def train(
     return 0
 
 
-def _outlook(steps: int, end: int, wanted: int) -> str | None:
+def _outlook(steps: int, end: int, wanted: int) -> Iterator[str]:
     """What is ahead, where it is not just as wanted."""
     if steps >= wanted:
-        return f"already complete: {steps} of {wanted} steps; give more with --set n_timesteps=..."
-    said = [f"going on after {steps} steps"] if steps else []
-    said += [f"whole rounds end after {end} steps, not {wanted}"] if end > wanted else []
-    return "; ".join(said) or None
+        yield f"already complete: {steps} of {wanted} steps; give more with --set n_timesteps=..."
+        return
+    if steps > 0:
+        yield f"going on after {steps} steps"
+    if end > wanted:
+        yield f"whole rounds end after {end} steps, not {wanted}"
 
 
 def require_training() -> None:
@@ -156,15 +159,15 @@ def _stopping() -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _bar(steps: int) -> Iterator[Any]:
-    """A progress bar, and a line an evaluation or other news."""
+    """A progress bar, and a line an evaluation."""
     with tqdm(total=steps, unit="step", unit_scale=True, leave=False, disable=None, bar_format=BAR) as bar:
 
-        def report(done: int, news: dict[str, Any] | str | None) -> None:
+        def report(done: int, evaluation: dict[str, Any] | None) -> None:
             if bar.n == 0 and done > 0:
                 bar.initial = bar.n = done
             bar.update(done - bar.n)
-            if news is not None:
-                bar.write(news if isinstance(news, str) else line(news))
+            if evaluation is not None:
+                bar.write(line(evaluation))
 
         yield report
 

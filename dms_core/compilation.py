@@ -62,10 +62,8 @@ class _Announcer(event.Listener):
 
     def on_start(self, event: event.Event) -> None:
         """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""
-        if isinstance(event.data["dispatcher"]._cache, NullCache):
-            return
-        self._depth += 1
-        if self._depth == 1 and time.monotonic() - self._ended > QUIET:
+        self._depth += _kept(event)
+        if _kept(event) and self._depth == 1 and time.monotonic() - self._ended > QUIET:
             print(
                 "dms_core: compiling what is new, kept on disk (seconds; about a minute the very first time) ...",
                 file=sys.stderr,
@@ -74,11 +72,14 @@ class _Announcer(event.Listener):
 
     def on_end(self, event: event.Event) -> None:
         """The pause between two stretches of compiling begins where the outermost function is done."""
-        if isinstance(event.data["dispatcher"]._cache, NullCache):
-            return
-        self._depth -= 1
-        if self._depth == 0:
+        self._depth -= _kept(event)
+        if _kept(event) and self._depth == 0:
             self._ended = time.monotonic()
+
+
+def _kept(event: event.Event) -> bool:
+    """Whether what is compiled is kept on disk."""
+    return not isinstance(event.data["dispatcher"]._cache, NullCache)
 
 
 _announcer: _Announcer | None = None

@@ -90,11 +90,7 @@ class InternalModel:
 
     def resting_moment(self, flexion: float) -> float:
         """Moment that must be given about the elbow to hold arm and load at rest [Nm]."""
-        return self.moment(flexion, 0.0, 0.0)
-
-    def moment(self, flexion: float, rate: float, acceleration: float) -> float:
-        """Moment that must be given about the elbow [Nm] at a flexion [rad], its rate and its acceleration."""
-        return needed_moment(self.arm, self.load, flexion, rate, acceleration)
+        return needed_moment(self.arm, self.load, flexion, 0.0, 0.0)
 
     def muscle_moment(self, flexion: float, activations: np.ndarray) -> float:
         """Moment that the muscles give about the elbow at rest [Nm]; activations [-], shape (6,), at least 0.01."""
