@@ -61,19 +61,19 @@ test: $(TRAIN_STAMP)
 
 test-slow: $(ALL_STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS) -m slow
-	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow" tests/agents/test_export.py tests/agents/test_sweep.py
+	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow" tests/agents/export tests/agents/distributed/test_sweep.py
 
 test-oldest: $(TRAIN_STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv/oldest \
 	    gymnasium==$(OLDEST_GYMNASIUM)
-	PYTHONPATH=$(CURDIR)/.venv/oldest $(BIN)/python -m pytest -n $(WORKERS) tests/env
+	PYTHONPATH=$(CURDIR)/.venv/oldest $(BIN)/python -m pytest -n $(WORKERS) tests/exo_env/envs tests/exo_env/world tests/exo_env/rendering
 
 # RLlib pins another Gymnasium than the newest: an environment of its own.
 test-rllib:
 	$(PYTHON) -m venv .venv/rllib
 	.venv/rllib/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	    -e . "ray[rllib]" torch pytest pytest-xdist
-	.venv/rllib/bin/python -m pytest tests/agents/test_rllib.py
+	.venv/rllib/bin/python -m pytest tests/agents/distributed/test_rllib.py
 
 # One thread each: numerical libraries must not take cores that a table does not tell of. Fifteen minutes in all.
 BENCH := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks

@@ -20,22 +20,22 @@ from typing import Annotated, Any, Literal
 from tqdm import tqdm
 from tyro.conf import arg
 
-from agents.baselines import POLICIES
-from agents.evaluate import evaluate as run_all
-from agents.export import export
-from agents.figure import draw
-from agents.learned import find_policy, repetitions_of, shipped_policies
-from agents.report import report
-from agents.sweep import sweep
-from agents.tables import heading, short_table, statistic, whole_table
-from agents.train_command import train
-from agents.tune_command import tune_baselines
-from agents.video import video
+from agents.commands.report import report
+from agents.commands.train import train
+from agents.commands.tune_baselines import tune_baselines
+from agents.commands.video import video
+from agents.distributed.sweep import sweep
+from agents.evaluation.evaluate import evaluate as run_all
+from agents.evaluation.figure import draw
+from agents.evaluation.tables import heading, short_table, statistic, whole_table
+from agents.export.export import export
+from agents.policies.baselines import POLICIES
+from agents.policies.learned import find_policy, repetitions_of, shipped_policies
 from dms_core.command_line import run_command
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, whole_file, write_json
-from exo_env.panels import require_matplotlib
-from exo_env.population import population as find_population
+from exo_env.patient.population import population as find_population
+from exo_env.rendering.panels import require_matplotlib
 
 
 def evaluate(
@@ -78,7 +78,7 @@ def evaluate(
             bar.update()
 
         if workers == "ray":
-            from agents.shared_evaluation import evaluate_by_ray
+            from agents.distributed.shared_evaluation import evaluate_by_ray
 
             results = evaluate_by_ray(
                 used, population, patients, seed, loads=loads, address=address, progress=progress,

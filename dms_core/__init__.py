@@ -13,15 +13,20 @@ Letters, as in the paper (SI units, radians):
     Ls        tendon slack length                              p         Euler parameters, scalar first
 """
 
-from dms_core.compilation import drop_stale_code
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-drop_stale_code()
+from dms_core.old_names import MOVED
+from dms_core.renamed import moved_modules
 
-from dms_core.assembly.model import Model  # noqa: E402
-from dms_core.errors import AssemblyError, DmsError, InputError, ModelError, SimulationError  # noqa: E402
-from dms_core.model.system import System  # noqa: E402
-from dms_core.results import Result, SolveStats, States, Trajectory  # noqa: E402
-from dms_core.simulation.dynamics import Simulation, SolverOptions, World, simulate  # noqa: E402
+if TYPE_CHECKING:
+    from dms_core.assembly.model import Model
+    from dms_core.errors import AssemblyError, DmsError, InputError, ModelError, SimulationError
+    from dms_core.model.system import System
+    from dms_core.results import Result, SolveStats, States, Trajectory
+    from dms_core.simulation.dynamics import Simulation, SolverOptions, World, simulate
+
+moved_modules("dms_core", MOVED)
 
 __all__ = [
     "AssemblyError",
@@ -40,3 +45,23 @@ __all__ = [
     "World",
     "simulate",
 ]
+
+_MODULES = {
+    "errors": ("AssemblyError", "DmsError", "InputError", "ModelError", "SimulationError"),
+    "assembly.model": ("Model",),
+    "model.system": ("System",),
+    "results": ("Result", "SolveStats", "States", "Trajectory"),
+    "simulation.dynamics": ("Simulation", "SolverOptions", "World", "simulate"),
+}
+"""Where each public name is declared; it is loaded when it is first asked for, so that the import is quick."""
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _MODULES.items():
+        if name in names:
+            return getattr(import_module(f"dms_core.{module}"), name)
+    raise AttributeError(f"module 'dms_core' has no attribute '{name}'; it has {', '.join(__all__)}.")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

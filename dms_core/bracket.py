@@ -4,7 +4,7 @@ The Illinois method (Dowell and Jarratt 1971): false position, where an end that
 superlinearly and never leaves the bracket, which here has its negative value at the low end.
 """
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 
 
 @compiled

@@ -1,25 +1,29 @@
 """The human-exoskeleton ecosystem of the paper (sect. 4): subject, elbow exoskeleton and gym machine in one system.
 
-Importing it registers the environment exo/ElbowLift-v0 with Gymnasium and loads nothing else; take what you need from
-the modules:
+Importing it registers the environments with Gymnasium and loads nothing else; take what you need from the folders:
 
-    lift_env                          the environment, made of actions, observations, rewards, events, episode
-    vector_env, sb3                   many of them in one compiled batch, for Gymnasium and for Stable-Baselines3
-    human, exoskeleton, gym_machine   the three subsystems of Fig. 8, from configs/
-    ecosystem                         joins them into one dms_core System
-    motor_command                     what the subject's muscles are told
-    patient, population, effort       who is assisted, and how a patient's command becomes excitations
-    scenarios, orderings, tune        the paper's use cases and its controller tuning
-    arm26                             the bare arm under a table of excitations
+    envs        the environments, one file an id; many worlds in one compiled batch; Stable-Baselines3
+    tasks       what is observed, rewarded and ended, and along which movement
+    drives      what an action does to the device
+    patient     who is assisted, populations, and how a command becomes excitations
+    ecosystem   the three subsystems of Fig. 8, from configs/, joined into one dms_core System
+    world       the arrays of one world, a control period, a reset
+    rendering   pictures of an episode
+    paper       the paper's use cases and its controller tuning
 """
 
 from gymnasium.envs.registration import register
+
+from dms_core.renamed import moved_modules
+from exo_env.old_names import MOVED
+
+moved_modules("exo_env", MOVED)
 
 # Gymnasium's passive checker takes a first reset that raised for done, and breaks at the next step; the environment
 # checks its arguments itself.
 register(
     id="exo/ElbowLift-v0",
-    entry_point="exo_env.lift_env:ElbowLiftEnv",
-    vector_entry_point="exo_env.vector_env:ElbowLiftVectorEnv",
+    entry_point="exo_env.envs.elbow_lift:ElbowLiftEnv",
+    vector_entry_point="exo_env.envs.vector_env:ElbowLiftVectorEnv",
     disable_env_checker=True,
 )

@@ -21,13 +21,13 @@ from dms_core.errors import InputError
 from dms_core.model.control.ziegler_nichols import STEP, Gains, ziegler_nichols
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.output_file import check_writable, write_csv, write_json
-from exo_env import arm26 as bare
-from exo_env.exoskeleton import Exoskeleton
-from exo_env.measures import columns, summary
-from exo_env.orderings import judged
-from exo_env.scenarios import FILES, ScenarioRun, load_scenarios, run
-from exo_env.tune import START, StepExperiment, proportional
-from exo_env.tune import tune as find_gains
+from exo_env.ecosystem import bare_arm as bare
+from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.paper.scenarios import FILES, ScenarioRun, load_scenarios, run
+from exo_env.paper.statements import judged
+from exo_env.paper.summary import columns, summary
+from exo_env.paper.tuning import START, StepExperiment, proportional
+from exo_env.paper.tuning import tune as find_gains
 
 DEVICE = "exoskeletons/elbow.yaml"
 BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
@@ -62,7 +62,7 @@ def scenarios(out: Path, rtol: float = SolverOptions.rtol) -> int:
 
 def _draw_scenarios(out: Path, runs: list[ScenarioRun]) -> None:
     """Figs. 6, 7, 9 to 13."""
-    from exo_env.figures import scenario_figures
+    from exo_env.paper.figures import scenario_figures
 
     scenario_figures(out, runs)
     device = Exoskeleton.from_config(DEVICE)
@@ -71,7 +71,7 @@ def _draw_scenarios(out: Path, runs: list[ScenarioRun]) -> None:
 
 def _draw_steps(out: Path, experiment: StepExperiment, Kc: float, gains: Gains) -> None:
     """Figs. 6 and 7."""
-    from exo_env.figures import step_response
+    from exo_env.paper.figures import step_response
 
     for name, title, used in (
         ("fig06_critical_gain.png", "critical gain", proportional(Kc)),
@@ -198,7 +198,7 @@ def soak(steps: int = 100_000, population: str = "evaluation", seed: int = 0, ac
         seed: of patients and actions.
         action_mode: 'rope_tension' or 'pid_setpoint'.
     """
-    from exo_env.soak import soak as long_run
+    from exo_env.envs.soak import soak as long_run
 
     if steps < 1:
         raise InputError(f"--steps {steps}: at least 1 is wanted.")

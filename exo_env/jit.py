@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dms_core.compilation import drop_stale_code
-from dms_core.jit import compiled
+from dms_core.compiled.compilation import drop_stale_code
+from dms_core.compiled.jit import compiled
 
 __all__ = ["compiled"]
 

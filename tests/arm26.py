@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.frames import quaternion, unit
+from dms_core.model.geometry.frames import quaternion, unit
 from dms_core.model.muscles.muscle import ThelenMuscle
 from dms_core.model.signals import Input
 from dms_core.model.system import System

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import floats, ints, matrix, naturals
-from dms_core.assembly.calls import call_entry
 from dms_core.assembly.tables import CALLS, WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import floats, ints, matrix, naturals
+from dms_core.compiled.calls import call_entry
+from dms_core.compiled.jit import compiled
 
 
 class Views(NamedTuple):

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dms_core.assembly.arena import Packed, inner
-from dms_core.assembly.entries import all_calls, moving_calls
+from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.layout import Layout, same_structure
 from dms_core.assembly.residual import (
     dense_constraints,
@@ -21,9 +20,11 @@ from dms_core.assembly.residual import (
 )
 from dms_core.assembly.sensing import Partials, Sensing, composition, evaluate_partials, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
+from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Calls, Signals, Work, new_work, signal_tables
-from dms_core.assembly.welds import Welds, find_welds, recover
-from dms_core.compilation import announce
+from dms_core.compiled.arena import Packed, inner
+from dms_core.compiled.compilation import announce
+from dms_core.compiled.entries import all_calls, moving_calls
 from dms_core.errors import ModelError
 from dms_core.linear.lu import assemble as assemble_lu
 from dms_core.linear.lu import factor, storage
@@ -31,7 +32,6 @@ from dms_core.linear.ordering import SingularMatrixError
 from dms_core.linear.rank import independent_rows, minimum_norms
 from dms_core.linear.symbolic import LuTables, plan
 from dms_core.model.system import System
-from dms_core.simulation.initial_conditions import Start, assemble
 from dms_core.simulation.parts import part_addresses
 from dms_core.simulation.state import STATE, Tables, new_state
 

@@ -5,8 +5,6 @@ r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi 
 
 import math
 
-from dms_core.assembly.arena import floats, ints, matrix
-from dms_core.assembly.calls import call_signal
 from dms_core.assembly.local import (
     add_constraint_forces,
     add_dynamic_rows,
@@ -24,7 +22,9 @@ from dms_core.assembly.scatter import (
     scatter_dynamic_rates,
 )
 from dms_core.assembly.tables import CALLS, FUNCTION, HARMONIC, SIGNALS, WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import floats, ints, matrix
+from dms_core.compiled.calls import call_signal
+from dms_core.compiled.jit import compiled
 
 
 @compiled

@@ -3,10 +3,10 @@
 Indices are read as unsigned: that spares the loops numba's test for negative ones.
 """
 
-from dms_core.assembly.arena import fields, indices, inner, ints, matrix, naturals
 from dms_core.assembly.sparsity import NewtonPattern, Part, RatePattern
 from dms_core.assembly.tables import WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import fields, indices, inner, ints, matrix, naturals
+from dms_core.compiled.jit import compiled
 
 PART, NEWTON, RATES = fields(Part), fields(NewtonPattern), fields(RatePattern)
 

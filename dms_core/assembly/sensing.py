@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import Packed, fields, floats, indices, inner, ints, matrix
-from dms_core.assembly.entries import integers_of, numbers_of
 from dms_core.assembly.layout import Layout
 from dms_core.assembly.local import evaluate_constraint, evaluate_dynamic, evaluate_sensor, views
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.assembly.tables import CALLS, WORK
-from dms_core.jit import compiled
-from dms_core.model.rotations import (
+from dms_core.compiled.arena import Packed, fields, floats, indices, inner, ints, matrix
+from dms_core.compiled.entries import integers_of, numbers_of
+from dms_core.compiled.jit import compiled
+from dms_core.model.geometry.rotations import (
     add,
     add_gradient,
     bilinear,

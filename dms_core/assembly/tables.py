@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import fields
-from dms_core.assembly.calls import SIGNAL, address
 from dms_core.assembly.layout import Layout
+from dms_core.compiled.arena import fields
+from dms_core.compiled.calls import SIGNAL, address
 from dms_core.errors import InputError
 from dms_core.model.signals import Function, Harmonic
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.linear.lanes import WIDTH, dot, eliminate, subtract
 from dms_core.linear.symbolic import LuTables
 

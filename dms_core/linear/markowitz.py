@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 
 SEARCHED = 8
 """Rows and columns with admissible entries that are looked at for one pivot."""

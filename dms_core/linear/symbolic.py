@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError
-from dms_core.jit import compiled
 from dms_core.linear.lanes import WIDTH
 from dms_core.linear.ordering import SingularMatrixError, compressed, markowitz
 

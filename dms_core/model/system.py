@@ -10,7 +10,7 @@ import numpy as np
 from dms_core.errors import ModelError, choices
 from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.element import GROUND, Body, Constraint, Declaration, Force, Sensor
-from dms_core.model.frames import rotation_matrix
+from dms_core.model.geometry.frames import rotation_matrix
 from dms_core.model.signals import Input
 
 

@@ -12,9 +12,9 @@ have the same form qdot = c0 q + cq. Its error constant is |1/6 - 3 gamma^2 + 2 
 
 import math
 
-from dms_core.assembly.arena import flags, floats, inner, ints, naturals
 from dms_core.assembly.tables import WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import flags, floats, inner, ints, naturals
+from dms_core.compiled.jit import compiled
 from dms_core.simulation.newton import CONVERGED, DIVERGED, STALE_MATRIX, newton
 from dms_core.simulation.parts import set_inputs
 from dms_core.simulation.state import AGE, H_BEFORE, H_BEFORE2, MODEL, STALE, STATE, T

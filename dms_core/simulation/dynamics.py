@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from dms_core.assembly.arena import Packed
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import with_settings
+from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.model.signals import Constant
 from dms_core.model.system import System

@@ -10,9 +10,9 @@ which changes first-order rates and accelerations linearly and leaves the matrix
 
 import math
 
-from dms_core.assembly.arena import flags, floats, inner, ints, naturals, number
 from dms_core.assembly.tables import WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import flags, floats, inner, ints, naturals, number
+from dms_core.compiled.jit import compiled
 from dms_core.simulation.parts import BOTH_MATRICES, RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
 from dms_core.simulation.state import (
     AGE,

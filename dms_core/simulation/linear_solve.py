@@ -1,7 +1,7 @@
 """The two linear systems of a step, solved from the packed tables."""
 
-from dms_core.assembly.arena import fields, indices, inner, naturals, number
-from dms_core.jit import compiled
+from dms_core.compiled.arena import fields, indices, inner, naturals, number
+from dms_core.compiled.jit import compiled
 from dms_core.linear.lu import factor, solve
 from dms_core.linear.symbolic import LuTables
 

@@ -7,9 +7,9 @@ iteration contracts; corrections of a step that does not reduce the simplified N
 
 import math
 
-from dms_core.assembly.arena import floats, inner, ints, naturals
 from dms_core.assembly.tables import WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import floats, inner, ints, naturals
+from dms_core.compiled.jit import compiled
 from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, SINGULAR_PIVOT, run_part
 from dms_core.simulation.state import (
     AGE,

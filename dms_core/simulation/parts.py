@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from dms_core.assembly.arena import floats, inner, ints
-from dms_core.assembly.calls import PART, address, call_part
 from dms_core.assembly.residual import (
     evaluate_both,
     evaluate_constraints,
@@ -19,7 +17,9 @@ from dms_core.assembly.residual import (
     evaluate_rates,
     evaluate_residual,
 )
-from dms_core.jit import compiled
+from dms_core.compiled.arena import floats, inner, ints
+from dms_core.compiled.calls import PART, address, call_part
+from dms_core.compiled.jit import compiled
 from dms_core.simulation.linear_solve import back_substitute, factorise
 from dms_core.simulation.state import BEFORE_JUMP, C0_FACTORED, MODEL, PIVOT, STALE, STATE, T_INPUTS
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.arena import Packed, fields, floats, inner, ints
 from dms_core.assembly.sparsity import NewtonPattern, RatePattern
 from dms_core.assembly.tables import WORK, Calls, Signals, Work
-from dms_core.jit import compiled
+from dms_core.compiled.arena import Packed, fields, floats, inner, ints
+from dms_core.compiled.jit import compiled
 from dms_core.linear.lu import LuTables, storage
 
 # Entries of State.clock [s, unless said].

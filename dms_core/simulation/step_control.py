@@ -7,9 +7,9 @@ keeps the factorised matrix good.
 
 import math
 
-from dms_core.assembly.arena import floats, inner, ints
 from dms_core.assembly.tables import SIGNALS, WORK
-from dms_core.jit import compiled
+from dms_core.compiled.arena import floats, inner, ints
+from dms_core.compiled.jit import compiled
 from dms_core.simulation.bdf2 import GAMMA, bdf2_step, set_weights, start_step
 from dms_core.simulation.initial_rates import consistent_rates, jump_rates, stage_rates
 from dms_core.simulation.newton import CONVERGED, MAX_ITERATIONS, SINGULAR, note_errors

@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from exo_env.lift_env import ElbowLiftEnv
-from exo_env.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftEnv
+from exo_env.envs.vector_env import ElbowLiftVectorEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.peer_table import MEASURED, PeerTable

@@ -28,9 +28,9 @@ import numpy as np
 from dms_core import Model, Simulation, SolverOptions, System
 from dms_core.model import Revolute, ThelenMuscle
 from dms_core.model.signals import Constant
-from exo_env.arm26 import bare_arm
-from exo_env.human import MUSCLES
-from exo_env.vector_env import ElbowLiftVectorEnv
+from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.bare_arm import bare_arm
+from exo_env.envs.vector_env import ElbowLiftVectorEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.env_speed import actions_of

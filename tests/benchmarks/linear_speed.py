@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 from dms_core.linear.lu import assemble, factor, solve, solve_transposed, storage
 from dms_core.linear.symbolic import plan
-from tests.linear.chain_matrix import chain_newton_matrix
+from tests.dms_core.linear.chain_matrix import chain_newton_matrix
 
 
 @njit(cache=True)

@@ -8,9 +8,9 @@ import numpy as np
 
 from dms_core import Model, Simulation, System
 from dms_core.model import Constant, Gravity, Revolute, RigidBody
-from exo_env.arm26 import bare_arm
-from exo_env.human import MUSCLES
-from exo_env.scenarios import build, load_scenarios
+from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.bare_arm import bare_arm
+from exo_env.paper.scenarios import build, load_scenarios
 from tests.benchmarks.chain_reference import TIP
 
 ARM_TASKS = {

@@ -23,10 +23,10 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 
-from agents.algorithms import build
-from agents.config import Config
-from exo_env.lift_env import ElbowLiftEnv
-from exo_env.sb3 import ElbowLiftVecEnv
+from agents.training.algorithms import build
+from agents.training.config import Config
+from exo_env.envs.elbow_lift import ElbowLiftEnv
+from exo_env.envs.stable_baselines import ElbowLiftVecEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import LUMP_MS, lump
 

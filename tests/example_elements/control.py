@@ -9,7 +9,7 @@ from dms_core.model.control.delayed_error import DelayedError
 from dms_core.model.control.pid import Pid
 from dms_core.model.control.reference_filter import ReferenceFilter
 from dms_core.model.element import GROUND
-from dms_core.model.frames import quaternion
+from dms_core.model.geometry.frames import quaternion
 from dms_core.model.signals import Input
 from dms_core.model.system import System
 from tests.example_elements import Example

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from dms_core.model.element import GROUND
 from dms_core.model.forces.first_order import FirstOrder
+from dms_core.model.geometry.path import PathPoint
 from dms_core.model.muscles.muscle import ThelenMuscle
 from dms_core.model.muscles.thelen_curves import ThelenCurves
-from dms_core.model.ropes.path import PathPoint
 from dms_core.model.sensors.muscle import UNITS, MuscleSensor
 from tests.example_elements import Example, Range
 from tests.example_elements.pair import pair

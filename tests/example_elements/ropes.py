@@ -5,7 +5,7 @@ from __future__ import annotations
 from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.control.actuator import RopeActuator
 from dms_core.model.element import GROUND
-from dms_core.model.ropes.path import PathPoint
+from dms_core.model.geometry.path import PathPoint
 from dms_core.model.ropes.rope_force import RopeForce
 from dms_core.model.sensors.rope import RopeSensor
 from tests.example_elements import Example

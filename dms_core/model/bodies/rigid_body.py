@@ -13,10 +13,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
-from dms_core.model.frames import g_matrix, rotation_matrix
-from dms_core.model.rotations import euler_parameters
+from dms_core.model.geometry.frames import g_matrix, rotation_matrix
+from dms_core.model.geometry.rotations import euler_parameters
 
 
 @compiled

@@ -12,18 +12,18 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.primitives import joint_pattern
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Constraint, Placement, Vector
-from dms_core.model.joint_angle import (
+from dms_core.model.geometry.angle import (
     add_angle_gradient,
     add_angle_hessian,
     add_angle_rate_gradient,
     angle_frame,
     joint_angle,
 )
-from dms_core.model.rotations import vec
+from dms_core.model.geometry.rotations import vec
 
 
 @compiled

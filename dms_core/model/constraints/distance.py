@@ -12,11 +12,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.element import GROUND, Constraint, ConstraintPattern, Placement, Vector
-from dms_core.model.rotations import dot, vec
-from dms_core.model.separation import (
+from dms_core.model.geometry.rotations import dot, vec
+from dms_core.model.geometry.separation import (
     add_separation_hessian,
     separation,
     separation_gradient,

@@ -13,12 +13,12 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.primitives import dot2, joint_pattern
 from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
-from dms_core.model.frames import unit
-from dms_core.model.rotations import vec
+from dms_core.model.geometry.frames import unit
+from dms_core.model.geometry.rotations import vec
 
 
 @compiled

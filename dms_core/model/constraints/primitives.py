@@ -10,9 +10,9 @@ H = (phi_q^T lam)_q for the bodies at local offsets oi and oj.
 
 import numpy as np
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import ConstraintPattern
-from dms_core.model.rotations import (
+from dms_core.model.geometry.rotations import (
     add_cross_hessian,
     add_gradient,
     add_hessian,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dms_core.errors import ModelError
-from dms_core.model.frames import rotation_matrix
+from dms_core.model.geometry.frames import rotation_matrix
 
 
 def joint_arms(system, joint) -> np.ndarray:

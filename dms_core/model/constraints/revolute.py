@@ -11,11 +11,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.primitives import coincidence, dot1, joint_pattern
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
-from dms_core.model.frames import perpendicular, unit
-from dms_core.model.rotations import vec
+from dms_core.model.geometry.frames import perpendicular, unit
+from dms_core.model.geometry.rotations import vec
 
 
 @compiled

@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Constraint, ConstraintPattern, Placement
-from dms_core.model.ropes.path import (
+from dms_core.model.geometry.path import (
     PathPoint,
     add_path_gradient,
     add_path_hessian,

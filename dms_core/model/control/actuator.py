@@ -28,7 +28,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.control.pid import Pid
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
 

@@ -16,11 +16,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
-from dms_core.model.joint_angle import add_angle_gradient, joint_angle
-from dms_core.model.rotations import vec
-from dms_core.model.sensed_angle import sensed_angle
+from dms_core.model.geometry.angle import add_angle_gradient, joint_angle
+from dms_core.model.geometry.rotations import vec
+from dms_core.model.geometry.sensed_angle import sensed_angle
 
 OWN = 14
 """Local coordinates: two bodies, then the states of the chain from first to last."""

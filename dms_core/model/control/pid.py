@@ -23,12 +23,12 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
-from dms_core.model.joint_angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
-from dms_core.model.rotations import vec
-from dms_core.model.sensed_angle import sensed_angle
+from dms_core.model.geometry.angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
+from dms_core.model.geometry.rotations import vec
+from dms_core.model.geometry.sensed_angle import sensed_angle
 
 OWN, FILTER = 14, 15
 """Local coordinates: two bodies, then q_c, then q_f if there is one."""

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.element import Force, Pattern, Placement, Vector
 
 

@@ -13,10 +13,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.joint_angle import (
+from dms_core.model.geometry.angle import (
     add_angle_hessian,
     add_angle_rate_gradient,
     angle_directions,
@@ -24,7 +24,7 @@ from dms_core.model.joint_angle import (
     angle_rate,
     joint_angle,
 )
-from dms_core.model.rotations import euler_parameters, k_times, rotated, vec
+from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated, vec
 
 
 @compiled

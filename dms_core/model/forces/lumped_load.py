@@ -14,10 +14,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.rotations import add_hessian, columns, cross, dot, euler_parameters, rotated, vec
+from dms_core.model.geometry.rotations import add_hessian, columns, cross, dot, euler_parameters, rotated, vec
 
 
 @compiled

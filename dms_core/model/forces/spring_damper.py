@@ -13,10 +13,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import GROUND, Force, Pattern, Placement, Vector
-from dms_core.model.rotations import dot, scale, vec
-from dms_core.model.separation import (
+from dms_core.model.geometry.rotations import dot, scale, vec
+from dms_core.model.geometry.separation import (
     add_separation_hessian,
     separation,
     separation_gradient,

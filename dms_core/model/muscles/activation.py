@@ -6,7 +6,7 @@ Continuous, with a kink in slope at u = a. With u limited to [MINIMUM, 1] a solu
 the activation itself needs no limit; a Newton iterate far below 0 is kept from a vanishing time constant.
 """
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 
 MINIMUM = 0.01
 """Least activation and excitation: a muscle is never fully silent, and its force stays invertible."""

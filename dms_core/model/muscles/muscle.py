@@ -23,18 +23,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.bracket import narrowed, trial
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
-from dms_core.model.muscles.activation import MINIMUM, activation_rate, limited
-from dms_core.model.muscles.thelen_curves import (
-    ThelenCurves,
-    active_force,
-    force_velocity,
-    passive_force,
-    tendon_force,
-)
-from dms_core.model.ropes.path import (
+from dms_core.model.geometry.path import (
     PathPoint,
     PathTable,
     add_path_gradient,
@@ -42,6 +34,14 @@ from dms_core.model.ropes.path import (
     path_length,
     path_pattern,
     path_table,
+)
+from dms_core.model.muscles.activation import MINIMUM, activation_rate, limited
+from dms_core.model.muscles.thelen_curves import (
+    ThelenCurves,
+    active_force,
+    force_velocity,
+    passive_force,
+    tendon_force,
 )
 
 LEAST_COSINE = 0.1

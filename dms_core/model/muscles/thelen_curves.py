@@ -20,8 +20,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.element import explain
 
 TOE_FORCE = 0.33

@@ -1,6 +1,6 @@
 """Ropes (paper sect. 3.3): paths through points of bodies, and the tension along them."""
 
-from dms_core.model.ropes.path import PathPoint
+from dms_core.model.geometry.path import PathPoint
 from dms_core.model.ropes.rope_force import RopeForce
 
 __all__ = ["PathPoint", "RopeForce"]

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Force, Pattern, Placement
-from dms_core.model.ropes.path import PathPoint, add_path_gradient, add_path_hessian, moving_path, path_pattern
+from dms_core.model.geometry.path import PathPoint, add_path_gradient, add_path_hessian, moving_path, path_pattern
 
 CONSTANT, INPUT, COORDINATE = 0, 1, 2
 """Where the tension comes from: first integer of the table."""

@@ -2,7 +2,7 @@
 
     y = [theta,  theta_q v,  theta_q vdot + v^T theta_qq v]
 
-theta = Im log z with z = c + i s (dms_core.model.joint_angle). Along a motion
+theta = Im log z with z = c + i s (dms_core.model.geometry.angle). Along a motion
 
     thetaddot   = Im(zddot / z - (zdot / z)^2)
     thetaddot_q = Im(k2 zddot_q + k1 zdot_q + k0 z_q)
@@ -17,10 +17,10 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
-from dms_core.model.joint_angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
-from dms_core.model.rotations import (
+from dms_core.model.geometry.angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
+from dms_core.model.geometry.rotations import (
     add,
     bilinear,
     dot,
@@ -31,7 +31,7 @@ from dms_core.model.rotations import (
     scale,
     vec,
 )
-from dms_core.model.sensed_angle import sensed_angle
+from dms_core.model.geometry.sensed_angle import sensed_angle
 
 
 @compiled
@@ -104,7 +104,7 @@ def add_angle_acceleration_gradient(k, oi, oj, f, g, h, q, v, a, G):
 
 @compiled
 def joint_angle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
-    """par: f, g, h of dms_core.model.joint_angle."""
+    """par: f, g, h of dms_core.model.geometry.angle."""
     f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)
     y[0] = joint_angle(0, 7, f, g, h, q)
     y[1] = angle_rate(0, 7, f, g, h, q, v)

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
 
 

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import DynamicElement, Placement, Sensor
-from dms_core.model.frames import unit
+from dms_core.model.geometry.frames import unit
 
 JOINT_MOMENT = 2
 

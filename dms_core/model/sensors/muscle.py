@@ -11,8 +11,9 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
+from dms_core.model.geometry.path import add_path_gradient, add_path_rate_gradient, path_length, path_rate
 from dms_core.model.muscles.muscle import (
     PATH_INTEGERS,
     PATH_NUMBERS,
@@ -22,7 +23,6 @@ from dms_core.model.muscles.muscle import (
     pennation_cosine,
     tendon_state,
 )
-from dms_core.model.ropes.path import add_path_gradient, add_path_rate_gradient, path_length, path_rate
 
 UNITS = {
     "length": "m",

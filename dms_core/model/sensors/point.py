@@ -2,7 +2,7 @@
 
     y = [r + A s,   rdot + (A s)',   rddot + (A s)'']
 
-With B(x, z) the symmetric bilinear form of dms_core.model.rotations, A s = B(p, p), (A s)' = 2 B(p, pdot) and
+With B(x, z) the symmetric bilinear form of dms_core.model.geometry.rotations, A s = B(p, p), (A s)' = 2 B(p, pdot) and
 (A s)'' = 2 B(p, pddot) + 2 B(pdot, pdot), so that every partial derivative is a multiple of B(., e_n).
 """
 
@@ -12,9 +12,9 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
-from dms_core.model.rotations import add, columns, point, point_rate, vec
+from dms_core.model.geometry.rotations import add, columns, point, point_rate, vec
 from dms_core.model.sensors.angle import rotated_acceleration
 
 

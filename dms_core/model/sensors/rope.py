@@ -12,11 +12,11 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.jit import compiled
 from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.element import Declaration, Placement, Sensor
-from dms_core.model.ropes.path import (
+from dms_core.model.geometry.path import (
     PathPoint,
     add_path_gradient,
     add_path_rate_gradient,

@@ -11,11 +11,11 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.jit import compiled
+from dms_core.compiled.jit import compiled
 from dms_core.model.control.pid import FILTER, OWN, Pid
 from dms_core.model.element import Placement, Sensor
-from dms_core.model.joint_angle import add_angle_gradient, joint_angle
-from dms_core.model.rotations import vec
+from dms_core.model.geometry.angle import add_angle_gradient, joint_angle
+from dms_core.model.geometry.rotations import vec
 
 
 @compiled

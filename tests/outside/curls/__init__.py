@@ -9,7 +9,7 @@ from gymnasium.envs.registration import register
 
 register(
     id="curls/HeavyCurl-v0",
-    entry_point="exo_env.lift_env:ElbowLiftEnv",
+    entry_point="exo_env.envs.elbow_lift:ElbowLiftEnv",
     kwargs={
         "patient": str(Path(__file__).with_name("tired.yaml")),
         "load": {"uniform": [2.5, 3.0]},

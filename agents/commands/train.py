@@ -1,0 +1,186 @@
+"""`python -m agents train`."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+from tqdm import tqdm
+from tyro.conf import arg
+
+from dms_core.errors import DmsError, InputError, extra
+
+STOPPED = 130
+"""Exit status of a run that was told to stop."""
+BAR = "{percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt} steps, {rate_fmt}, {elapsed} passed, {remaining} left"
+
+
+def train(
+    config: Path | None = None,
+    seed: int = 0,
+    changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
+    out: Path | None = None,
+    resume: Path | None = None,
+) -> int:
+    """Train a policy; Ctrl-C saves a checkpoint, and --resume goes on from the last one.
+
+    Args:
+        config: YAML file in the format of rl_zoo3, see configs/agents.
+        seed: decides all that is random.
+        changes: values that replace those of the configuration, for example n_timesteps=1e5 policy_kwargs.net_arch=[32]
+            training.eval_every=1e4.
+        out: folder of the training, empty or new; out/training/ALGORITHM_SEED where it is not given.
+        resume: folder of a training to go on with; of the values only n_timesteps and training.* may then be changed.
+    """
+    require_training()
+    from agents.training.run import TrainingRun
+
+    with _stopping() as stop:
+        folder, used, seed = _begun(config, seed, changes, out, resume)
+        with folder.locked(), _bar(used.n_timesteps) as report:
+            run = TrainingRun(folder, used, seed, report, stop)
+            for said in _outlook(run.steps, run.end, used.n_timesteps):
+                tqdm.write(said)
+            done = run.run()
+    if not done:
+        said = f"stopped after {run.steps} steps, an unfinished round is dropped"
+        print(f"{said}; go on with: python -m agents train --resume {folder.path}")
+        return STOPPED
+    best = max(run.evaluations, key=lambda e: e["return"])
+    print(f"{run.steps} steps in {run.seconds:.0f} s; best return {best['return']:.5g} after {best['steps']} steps")
+    print(f"written: {folder.path}")
+    return 0
+
+
+def _outlook(steps: int, end: int, wanted: int) -> Iterator[str]:
+    """What is ahead, where it is not just as wanted."""
+    if steps >= wanted:
+        yield f"already complete: {steps} of {wanted} steps; give more with --set n_timesteps=..."
+        return
+    if steps > 0:
+        yield f"going on after {steps} steps"
+    if end > wanted:
+        yield f"whole rounds end after {end} steps, not {wanted}"
+
+
+def require_training() -> None:
+    """Say what to install where training is not possible.
+
+    Raises:
+        DmsError: a package is missing.
+    """
+    try:
+        import sb3_contrib  # noqa: F401
+        import stable_baselines3  # noqa: F401
+        import tensorboard  # noqa: F401
+    except ImportError as error:
+        raise DmsError(f"training needs {error.name}. {extra('train')}") from None
+
+
+def _begun(config: Path | None, seed: int, changes: tuple[str, ...], out: Path | None, resume: Path | None) -> Any:
+    """Folder, configuration and seed of a new training or of one to go on with."""
+    from agents.training.run_folder import RunFolder
+
+    if resume is not None:
+        if config is not None or out is not None:
+            raise InputError("--resume takes configuration and folder from the training; leave out --config and --out.")
+        fixed = [c for c in changes if not c.startswith(("n_timesteps=", "training."))]
+        if fixed:
+            raise InputError(
+                f"--set {fixed[0]}: only n_timesteps and training.* may change in a training that goes on."
+            )
+        folder = RunFolder(resume)
+        return folder, *folder.go_on(changes)
+    if config is None:
+        raise InputError("--config FILE or --resume DIR is needed; see configs/agents.")
+    if seed < 0:
+        raise InputError(f"seed = {seed}; a whole number from 0 is wanted.")
+    # A mistake shall not leave a folder behind.
+    used = checked_config(config, changes)
+    folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
+    folder.begin(used, seed)
+    return folder, used, seed
+
+
+def checked_config(path: Path, changes: tuple[str, ...]) -> Any:
+    """A configuration that can be trained.
+
+    Raises:
+        InputError: names file, key and value.
+    """
+    from agents.training.algorithms import arguments
+    from agents.training.config import Config
+
+    found = Config.read(path, changes)
+    try:
+        arguments(found)
+        check_environment(found.env_kwargs)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return found
+
+
+def check_environment(env_kwargs: dict[str, Any]) -> None:
+    """Refuses settings that no environment can be made with.
+
+    Raises:
+        InputError: names the setting.
+    """
+    from exo_env.envs.elbow_lift import ElbowLiftEnv
+
+    ElbowLiftEnv(**env_kwargs)
+
+
+@contextlib.contextmanager
+def _stopping() -> Iterator[Any]:
+    """Whether the user wants to stop: asked after each step. A second Ctrl-C stops at once."""
+    asked: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+
+    def ask(number: int, frame: Any) -> None:
+        asked.append(number)
+        signal.signal(number, before[number])
+
+    before: dict[int, Any] = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, ask)
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def _bar(steps: int) -> Iterator[Any]:
+    """A progress bar, and a line an evaluation."""
+    with tqdm(total=steps, unit="step", unit_scale=True, leave=False, disable=None, bar_format=BAR) as bar:
+
+        def report(done: int, evaluation: dict[str, Any] | None) -> None:
+            if bar.n == 0 and done > 0:
+                bar.initial = bar.n = done
+            bar.update(done - bar.n)
+            if evaluation is not None:
+                bar.write(line(evaluation))
+
+        yield report
+
+
+def line(evaluation: dict[str, Any]) -> str:
+    """An evaluation in words."""
+
+    def shown(name: str, digits: str) -> str:
+        value = evaluation[name]
+        return "-" if value is None else format(value, digits)
+
+    tracking = f"tracking {shown('tracking_rms_deg', '.3g')} deg"
+    return (
+        f"{evaluation['steps']:>9} steps: return {shown('return', '.5g')}, {tracking}, "
+        f"work of the device {shown('device_work_share', '.2f')}, unsafe {shown('unsafe', '.2f')}"
+    )

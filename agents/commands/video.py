@@ -1,0 +1,164 @@
+"""`python -m agents video`: policies side by side on the same patient."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from tqdm import tqdm
+from tyro.conf import arg
+
+from agents.evaluation.evaluate import world_of
+from agents.policies.learned import find_policy, repetitions_of
+from agents.policies.policy import Policy
+from dms_core.errors import DmsError, InputError, extra
+from dms_core.output_file import check_writable
+from exo_env.patient.population import population
+
+BAND, FONT, MOST = 44, 18, 4
+"""Height of the titles and size of their letters [pixel], and policies that fit side by side."""
+INK, WARNING, PAPER = (40, 40, 40), (190, 50, 20), (255, 255, 255)
+GIF_STEP = 2
+"""A GIF takes every second picture: it is large, and few viewers show 50 a second."""
+
+
+def video(
+    policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="A B")],
+    out: Path,
+    patient: str = "stroke_severe",
+    seed: int = 0,
+    repetitions: int | None = None,
+) -> int:
+    """Film policies side by side, with the same patient, load and repetition.
+
+    Args:
+        policy_names: one to four, see `python -m agents policies`, or folders of trained ones.
+        out: .mp4, or .gif; without ffmpeg an .mp4 becomes a .gif.
+        patient: population to draw from.
+        seed: of the episode.
+        repetitions: of the movement; as the trained policies learned, 1 without one, where not given.
+    """
+    if not 1 <= len(set(policy_names)) == len(policy_names) <= MOST:
+        raise InputError(f"--policy {' '.join(policy_names)}: one to {MOST} different names are wanted.")
+    if out.suffix not in (".mp4", ".gif"):
+        raise InputError(f"output '{out}': a name that ends in .mp4 or .gif is wanted.")
+    used = [find_policy(name) for name in policy_names]
+    often = repetitions_of(used, repetitions)
+    stages = [Stage(policy, patient, seed, repetitions=often) for policy in used]
+    out = _possible(out)
+    check_writable(out)
+    rate, total = stages[0].rate, stages[0].length
+    with tqdm(total=total, unit="picture", leave=False, disable=None) as bar:
+        _write(out, _shown(pictures(stages), bar, GIF_STEP if out.suffix == ".gif" else 1), rate)
+    print(f"written: {out}")
+    return 0
+
+
+class Stage:
+    """One policy with its patient, step by step.
+
+    Args:
+        policy: that assists.
+        patient: population to draw from.
+        seed: of the episode.
+        settings: further ones of the environment.
+    """
+
+    def __init__(self, policy: Policy, patient: str, seed: int, **settings: Any) -> None:
+        self.policy = policy
+        self.env = world_of(policy, population(patient).model_dump(), render_mode="rgb_array", **settings)
+        self.observation, self.info = self.env.reset(seed=seed)
+        policy.reset(self.env)
+        world: Any = self.env.unwrapped
+        self.rate, self.length = round(1.0 / world.period), round(world.duration / world.period) + 1
+        self.over, self.event = False, ""
+
+    def step(self) -> None:
+        """One control period, unless the episode is over."""
+        if self.over:
+            return
+        action = self.policy(self.observation, self.info)
+        self.observation, _, terminated, truncated, self.info = self.env.step(action)
+        self.over, self.event = terminated or truncated, str(self.info.get("event", ""))
+
+    def picture(self) -> np.ndarray:
+        """Title and arm, uint8, shape (height, width, 3); after the end, how it ended."""
+        arm: Any = self.env.render()
+        return np.concatenate([band(arm.shape[1], self.policy.title, self.event), arm])
+
+
+def pictures(stages: list[Stage]) -> Iterator[np.ndarray]:
+    """All stages side by side, until the last one is over; the environments are then closed."""
+    yield np.concatenate([s.picture() for s in stages], axis=1)
+    while not all(s.over for s in stages):
+        for s in stages:
+            s.step()
+        yield np.concatenate([s.picture() for s in stages], axis=1)
+    for s in stages:
+        s.env.close()
+
+
+def band(width: int, title: str, event: str) -> np.ndarray:
+    """A title, and below it what ended the episode."""
+    import pygame
+
+    pygame.font.init()
+    surface = pygame.Surface((width, BAND))
+    surface.fill(PAPER)
+    for text, colour, size, y in ((title, INK, FONT, 4), (event, WARNING, FONT - 5, 26)):
+        line = pygame.font.Font(None, size + 6).render(text, True, colour)
+        surface.blit(line, ((width - line.get_width()) // 2, y))
+    return pygame.surfarray.array3d(surface).swapaxes(0, 1)
+
+
+def _shown(found: Iterator[np.ndarray], bar: tqdm, every: int) -> Iterator[np.ndarray]:
+    """Every so many pictures, with the bar moved."""
+    for k, picture in enumerate(found):
+        bar.update()
+        if k % every == 0:
+            yield picture
+
+
+def _possible(out: Path) -> Path:
+    """The file that can be written here.
+
+    Raises:
+        DmsError: imageio is missing.
+    """
+    try:
+        import imageio  # noqa: F401
+    except ImportError:
+        raise DmsError(f"videos need imageio. {extra('pictures')}") from None
+    if out.suffix == ".mp4":
+        try:
+            import imageio_ffmpeg
+
+            imageio_ffmpeg.get_ffmpeg_exe()
+        except (ImportError, RuntimeError):
+            print("without imageio-ffmpeg there is no .mp4; writing a .gif")
+            return out.with_suffix(".gif")
+    return out
+
+
+def _write(out: Path, found: Iterator[np.ndarray], rate: int) -> None:
+    """Write the file whole or not at all."""
+    import imageio.v2 as imageio
+
+    temporary = out.with_name(f".part.{out.name}")
+    if out.suffix == ".mp4":
+        options: dict[str, Any] = {"fps": rate, "codec": "libx264", "macro_block_size": 2, "quality": 7}
+    else:
+        options = {"duration": 1000.0 * GIF_STEP / rate, "loop": 0}
+    try:
+        writer: Any = imageio.get_writer(temporary, **options)
+        with writer:
+            for picture in found:
+                writer.append_data(picture)
+        os.replace(temporary, out)
+    except OSError as error:
+        raise DmsError(f"output '{out}' cannot be written: {error.strerror or error}.") from None
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""Work shared out by Ray, and the environment for RLlib."""

@@ -1,0 +1,102 @@
+"""Work shared out by Ray (https://www.ray.io), here or on a cluster; what a lost worker had is done again."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from dms_core.errors import DmsError, extra
+
+ROOT = Path(__file__).resolve().parents[2]
+RETRIES = 3
+"""Times a share is done again when its worker is lost."""
+POLL = 0.5
+"""Between two looks at who is done [s]."""
+PATIENCE = 10.0
+"""Until a cluster that does not answer is given up [s]."""
+TOKEN = "(Where the cluster wants a token, set RAY_AUTH_MODE=token and RAY_AUTH_TOKEN as it was started with.)"
+LEFT_BEHIND = ["/.git", "/.venv", "/out", "/build", "/dist", "__pycache__"]
+"""Not sent to a cluster."""
+
+
+def share_out(
+    function: Callable[..., Any],
+    shares: Sequence[tuple[Any, ...]],
+    *,
+    address: str | None = None,
+    cpus: int | None = None,
+    done: Callable[[int], None] = lambda k: None,
+    waiting: Callable[[], None] = lambda: None,
+) -> list[Any]:
+    """Call a function with each share of arguments, each call in one process.
+
+    Args:
+        function: of a module that workers can import.
+        shares: arguments of each call.
+        address: of a cluster, or 'auto' for that of this machine; a local one is started where it is not given. A
+            cluster with a token (the default of Ray 2.59 and later) reads it from RAY_AUTH_MODE and RAY_AUTH_TOKEN.
+        cpus: of a local one; all there are where it is not given.
+        done: called with the number of a share that is done.
+        waiting: called again and again while others work.
+
+    Returns:
+        What the calls returned, in the order of the shares.
+
+    Raises:
+        DmsError: Ray is missing or cannot be reached, a call failed, or a share lost its worker too often.
+    """
+    ray = _started(address, cpus)
+    try:
+        remote = ray.remote(num_cpus=1, max_retries=RETRIES)(function)
+        running = {remote.remote(*share): k for k, share in enumerate(shares)}
+        found: list[Any] = [None] * len(shares)
+        while running:
+            ready, _ = ray.wait(list(running), timeout=POLL)
+            for one in ready:
+                k = running.pop(one)
+                found[k] = ray.get(one)
+                done(k)
+            waiting()
+        return found
+    except ray.exceptions.RayTaskError as error:
+        raise DmsError(str(error.cause) if isinstance(error.cause, DmsError) else f"a worker failed: {error}") from None
+    except ray.exceptions.RayError as error:
+        said = " ".join(str(error).split())[:200]
+        raise DmsError(f"a share lost its worker {RETRIES + 1} times; not enough memory? Ray says: {said}") from None
+    finally:
+        ray.shutdown()
+
+
+def _started(address: str | None, cpus: int | None) -> Any:
+    """Ray, connected."""
+    try:
+        import ray
+    except ImportError:
+        raise DmsError(f"Ray is missing. {extra('sweep')}") from None
+    quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
+    try:
+        if address is None:
+            environment = {"env_vars": {"PYTHONPATH": str(ROOT)}}
+            ray.init("local", num_cpus=cpus, include_dashboard=False, runtime_env=environment, **quiet)
+        else:
+            _reach(address)
+            ray.init(address, runtime_env={"working_dir": str(ROOT), "excludes": LEFT_BEHIND}, **quiet)
+    except (ConnectionError, ValueError, RuntimeError, OSError) as error:
+        said = " ".join(str(error).split())[:200]
+        hint = "" if address is None or os.environ.get("RAY_AUTH_TOKEN") else f" {TOKEN}"
+        raise DmsError(f"Ray at '{address or 'local'}' cannot be reached: {said}{hint}") from None
+    return ray
+
+
+def _reach(address: str) -> None:
+    """Knock at a cluster's door: Ray itself would try for many minutes.
+
+    Raises:
+        OSError: nobody is there.
+    """
+    host, _, port = address.rpartition("://")[2].partition(":")
+    if port.isdecimal():
+        socket.create_connection((host, int(port)), timeout=PATIENCE).close()

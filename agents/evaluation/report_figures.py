@@ -1,0 +1,187 @@
+"""The figures of a report: learning curves, what tracking costs in help, and patients over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.evaluation.figure import COLOURS
+from agents.evaluation.time_course import Course
+from exo_env.rendering.panels import legend, panels, save
+
+CURVES = (
+    ("return", "return of an episode"),
+    ("tracking_rms_deg", "tracking, rms [deg]"),
+    ("device_work_share", "work of the device [-]"),
+)
+MARKERS = "osD^vP*X"
+PARETO = ("device_work_share", "tracking_rms_deg")
+FAR_OFF = 1.5
+"""Errors beyond so many times the middle one are not compared patient by patient."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Trainings that differ in nothing but their seed."""
+
+    label: str
+    curves: list[list[dict[str, Any]]]
+    """Evaluations of each seed."""
+
+
+def learning_curves(path: Path, groups: Sequence[Group]) -> None:
+    """Mean over the seeds and, as a band, the lowest to the highest of them."""
+    figure, axes = panels(1, len(CURVES), (3.4 * len(CURVES), 3.4), sharex="col")
+    for ax, (name, label) in zip(axes.flat, CURVES, strict=True):
+        for k, group in enumerate(groups):
+            steps, values = on_common_steps(group.curves, name)
+            colour, n = COLOURS[k % len(COLOURS)], len(group.curves)
+            seeds = f"{n} seed{'s' * (n > 1)}"
+            ax.plot(steps, values.mean(axis=0), color=colour, marker=".", label=f"{group.label} ({seeds})")
+            ax.fill_between(steps, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0.0)
+        ax.set_xlabel("decisions")
+        ax.set_title(label, fontsize=10)
+        ax.ticklabel_format(axis="x", style="sci", scilimits=(0, 4), useMathText=True)
+    legend(figure, axes.flat[0], 4)
+    save(figure, path)
+
+
+def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Curves at the steps of all of them, up to the end of the shortest.
+
+    Returns:
+        Steps, shape (m,), and values, shape (curves, m); what could not be measured is bridged.
+    """
+    kept = [[(e["steps"], e[name]) for e in curve if e[name] is not None] for curve in curves]
+    kept = [pairs for pairs in kept if pairs]
+    if not kept:
+        return np.zeros(0), np.zeros((1, 0))
+    end, begin = min(pairs[-1][0] for pairs in kept), max(pairs[0][0] for pairs in kept)
+    steps = np.array(sorted({s for pairs in kept for s, _ in pairs if begin <= s <= end}), dtype=float)
+    columns = [np.array(pairs, dtype=float).T for pairs in kept]
+    return steps, np.array([np.interp(steps, x, y) for x, y in columns])
+
+
+def pareto(path: Path, results: Mapping[str, Any]) -> None:
+    """Tracking over the share of the work that the device does: low is good in both, and one costs the other.
+
+    Beside it the same as differences to the first policy, patient by patient, of those that track nearly as well:
+    patients differ by more than policies do.
+    """
+    policies = list(results["policies"].values())
+    errors = [p["summary"][PARETO[1]]["value"] for p in policies]
+    near = [p for p, error in zip(policies, errors, strict=True) if error <= FAR_OFF * float(np.median(errors))]
+    compared = len(near) > 1 and policies[0] in near
+    figure, axes = panels(1, 1 + compared, (5.2 + 4.2 * compared, 4.4))
+    ax = axes.flat[0]
+    _points(ax, policies, policies, "summary")
+    _front(ax, policies)
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter("{x:g}" if max(errors) < 10.0 * min(errors) else "")
+    ax.grid(True, which="minor", axis="y", color="0.94", linewidth=0.4)
+    ax.set_xlabel("share of the device in the positive work [-]")
+    ax.set_ylabel("tracking error, rms [deg]")
+    ax.set_title("interquartile means; low is good in both, dotted: beaten by none", fontsize=9)
+    if compared:
+        other = axes.flat[1]
+        _points(other, near, policies, "difference")
+        other.locator_params(axis="x", nbins=6)
+        other.set_xlabel("share of the device: difference [-]")
+        other.set_ylabel("tracking error, rms: difference [deg]")
+        left_out = [p["title"] for p in policies if p not in near]
+        said = f"mean difference to {policies[0]['title']}, patient by patient"
+        other.set_title(said + (f"\n(far off: {', '.join(left_out)})" if left_out else ""), fontsize=9)
+    percent = 100.0 * results["confidence"]
+    figure.supxlabel(f"{results['patients']} patients, {results['population']}; {percent:g} % intervals", fontsize=9)
+    legend(figure, ax, 3)
+    save(figure, path)
+
+
+def _points(ax: Any, shown: Sequence[Mapping[str, Any]], policies: Sequence[Mapping[str, Any]], kind: str) -> None:
+    """A point with whiskers a policy; trainings that are shown together are dots of that colour without whiskers."""
+    x, y = PARETO
+    alone = [p for p in policies if _pool(p, policies) is None]
+    for p in shown:
+        one, other = p[kind][x], p[kind][y]
+        pool = _pool(p, policies)
+        k = alone.index(pool or p)
+        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
+        if pool is not None:
+            ax.plot(one["value"], other["value"], ".", color=colour, markersize=4, zorder=3)
+            continue
+        whiskers = [[[v["value"] - v["low"]], [v["high"] - v["value"]]] for v in (one, other)]
+        ax.errorbar(
+            one["value"], other["value"], xerr=whiskers[0], yerr=whiskers[1], color=colour, marker=marker, markersize=6,
+            linewidth=1.2, capsize=3, linestyle="", label=p["title"], alpha=0.8,
+        )  # fmt: skip
+
+
+def _pool(policy: Mapping[str, Any], policies: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The trainings with which a policy is shown together, or None."""
+    return next((p for p in policies if policy["title"] in p.get("of", ())), None)
+
+
+def _front(ax: Any, policies: Sequence[Mapping[str, Any]]) -> None:
+    """A line along the policies that none other beats in both."""
+    points = [[p["summary"][name]["value"] for name in PARETO] for p in policies]
+    best = sorted(p for p in points if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points))
+    ax.step(*zip(*best, strict=True), where="post", color="0.7", linewidth=1.0, linestyle=":", zorder=0)
+
+
+ROWS = (
+    ("elbow flexion [deg]", ""),
+    ("error [deg]", ""),
+    ("rope tension [N]", "solid: agonist, dashed: antagonist"),
+    ("moment [Nm]", "solid: device, dashed: muscles"),
+    ("effort [-]", ""),
+)
+
+
+def courses(path: Path, columns: Mapping[str, Sequence[Course]]) -> None:
+    """Patients over time, a column a patient, a colour a policy."""
+    figure, axes = panels(len(ROWS), len(columns), (1.2 + 4.4 * len(columns), 9.6), sharex="col", sharey="row")
+    for column, (title, found) in zip(axes.T, columns.items(), strict=True):
+        y = max((one.columns for one in found), key=lambda c: len(c["time"]))
+        column[0].plot(y["time"], np.degrees(y["reference"]), color="0.55", linewidth=3.5, alpha=0.6, label="reference")
+        for k, one in enumerate(found):
+            _course(column, one, COLOURS[k])
+        column[0].set_title(f"{title}\n{found[0].who}", fontsize=9)
+        column[-1].set_xlabel("time [s]")
+        column[-1].set_ylim(bottom=-0.05)
+    for ax, (label, lines) in zip(axes[:, 0], ROWS, strict=True):
+        ax.set_ylabel(label)
+        for other in axes[list(axes[:, 0]).index(ax)] if lines else ():
+            other.set_title(lines, fontsize=7, loc="right", pad=2, color="0.3")
+    figure.align_ylabels()
+    legend(figure, axes[0, 0], 4)
+    save(figure, path)
+
+
+def _course(column: Any, one: Course, colour: str) -> None:
+    """The lines of one episode, and a cross where an event ended it."""
+    angle, error, tension, moment, effort = column
+    y, dashes = one.columns, (0, (4, 2))
+    t, shown = y["time"], np.degrees(y["elbow_angle.angle"])
+    angle.plot(t, shown, color=colour, label=one.policy)
+    error.plot(t, shown - np.degrees(y["reference"]), color=colour)
+    tension.plot(t, y["agonist_tension"], color=colour)
+    tension.plot(t, y["antagonist_tension"], color=colour, linestyle=dashes, linewidth=1.0)
+    moment.plot(t, y["exo_moment"], color=colour)
+    moment.plot(t, y["muscle_moment"], color=colour, linestyle=dashes, linewidth=1.0)
+    effort.plot(t, y["effort"], color=colour)
+    if one.event is not None:
+        angle.plot(t[-1], shown[-1], "x", color=colour, markersize=9, markeredgewidth=2.5)
+        angle.annotate(
+            _short(one.event), (t[-1], shown[-1]), xytext=(8, 0), textcoords="offset points", va="center", fontsize=7,
+            color=colour,
+        )  # fmt: skip
+
+
+def _short(event: str) -> str:
+    """The first words of what ended an episode."""
+    return event if len(event) <= 60 else event[:57].rsplit(" ", 1)[0] + " ..."

@@ -1,0 +1,116 @@
+"""Search for the numbers of the baselines that give the best return on the training population.
+
+First a Latin hypercube over the ranges, then as many tries again around the best one so far, normally distributed with
+a tenth of each range. Every try meets the same patients, which are not those of an evaluation; what counts is the mean
+return, in which an unsafe episode weighs as much as it costs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from agents.evaluation.evaluate import episode, patient_seeds, world_of
+from agents.policies.baselines import POLICIES
+from agents.policies.tuned import Range
+from dms_core.errors import InputError
+
+POPULATION, STREAM = "mixed", 2**32
+"""Training population by default; added to a seed, so that the patients are not those of an evaluation with it."""
+SPREAD = 0.1
+"""Standard deviation around the best, as a share of each range."""
+BATCH = 8
+"""Tries of the second half that go out from the same best one."""
+MEASURED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N", "unsafe")
+
+
+@dataclass(frozen=True)
+class Try:
+    """Numbers, and the mean of some measures with them."""
+
+    policy: str
+    numbers: dict[str, float]
+    measures: dict[str, float]
+
+
+def tunable() -> dict[str, dict[str, Range]]:
+    """Ranges of every policy that has numbers to tune."""
+    return {name: kind.ranges for name, kind in POLICIES.items() if kind.ranges}
+
+
+def trial(policy: str, numbers: dict[str, float], population: str, seeds: list[int], settings: dict[str, Any]) -> Try:
+    """Means over the episodes of some seeds."""
+    acting = POLICIES[policy](**numbers)
+    env = world_of(acting, population, **settings)
+    found = [episode(env, acting, seed)["measures"] for seed in seeds]
+    env.close()
+    return Try(policy, numbers, {m: float(np.nanmean([f[m] for f in found])) for m in MEASURED})
+
+
+def tune(
+    policy: str,
+    tries: int,
+    patients: int,
+    seed: int,
+    *,
+    population: str = POPULATION,
+    workers: int = 1,
+    progress: Callable[[str], None] | None = None,
+    **settings: Any,
+) -> list[Try]:
+    """Tries of a policy, best first.
+
+    Args:
+        policy: one of `tunable`.
+        tries: how many.
+        patients: episodes of each.
+        seed: of the patients and of the search.
+        population: of the patients, by name or YAML file.
+        workers: processes.
+        progress: called with the name of the policy after each try.
+        settings: further ones of the environment.
+
+    Raises:
+        InputError: the policy has nothing to tune, or a number is not usable.
+    """
+    if policy not in tunable():
+        raise InputError(f"policy '{policy}' has nothing to tune; there are {', '.join(tunable())}.")
+    for name, value, least in (
+        ("tries", tries, 2),
+        ("patients", patients, 1),
+        ("seed", seed, 0),
+        ("workers", workers, 1),
+    ):
+        if not isinstance(value, int) or value < least:
+            raise InputError(f"{name} = {value!r}; a whole number from {least} is wanted.")
+    ranges, seeds = tunable()[policy], patient_seeds(STREAM + seed, patients)
+    generator = np.random.default_rng(seed)
+    found: list[tuple[np.ndarray, Try]] = []
+
+    def run(places: np.ndarray, pool: ProcessPoolExecutor) -> None:
+        """Try these places, each from 0 to 1 in every range."""
+        rows = [{n: r.at(x) for (n, r), x in zip(ranges.items(), place, strict=True)} for place in places]
+        tried = pool.map(trial, repeat(policy), rows, repeat(population), repeat(seeds), repeat(settings))
+        for place, one in zip(places, tried, strict=True):
+            found.append((place, one))
+            if progress is not None:
+                progress(policy)
+
+    with ProcessPoolExecutor(workers) as pool:
+        first = tries // 2
+        run(qmc.LatinHypercube(len(ranges), rng=generator).random(first), pool)
+        while len(found) < tries:
+            best = max(found, key=_return)[0]
+            count = min(BATCH, tries - len(found))
+            run(np.clip(best + SPREAD * generator.standard_normal((count, len(ranges))), 0.0, 1.0), pool)
+    return [one for _, one in sorted(found, key=_return, reverse=True)]
+
+
+def _return(entry: tuple[np.ndarray, Try]) -> float:
+    return entry[1].measures["return"]

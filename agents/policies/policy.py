@@ -1,0 +1,56 @@
+"""What a policy is, and how it reads its observation by name."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+
+from agents.policies.tuned import Range
+
+
+class Policy(ABC):
+    """What acts in exo/ElbowLift-v0."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    training: ClassVar[str | None] = None
+    """What trainings that differ in nothing but the seed have in common; None: not trained, or not known."""
+    action_mode: ClassVar[str]
+    """Of the environment it acts in."""
+    observation: ClassVar[tuple[str, ...]] = ("device",)
+    """Groups that it sees."""
+    ranges: ClassVar[dict[str, Range]] = {}
+    """Where its numbers may lie, which `python -m agents tune-baselines` searches; arguments of its constructor."""
+
+    @abstractmethod
+    def reset(self, env: gymnasium.Env) -> None:
+        """Begin an episode; the environment has been reset. Of it, only settings may be read, never its state."""
+
+    @abstractmethod
+    def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
+        """The action, shape (2,).
+
+        Args:
+            observation: of the environment.
+            info: of its last step or reset.
+        """
+
+
+class Channels:
+    """Readings in their units from an observation.
+
+    Args:
+        env: whose observations are read.
+    """
+
+    def __init__(self, env: gymnasium.Env) -> None:
+        world: Any = env.unwrapped
+        self._slices = {part.name: part for part in world.observation_structure}
+
+    def read(self, observation: np.ndarray, name: str, component: int = 0) -> float:
+        """One component of a channel [unit of the channel]."""
+        part = self._slices[name]
+        return float(observation[part.start + component]) * part.scale

@@ -1,0 +1,213 @@
+"""The algorithms of Stable-Baselines3 and sb3-contrib: which there are, and what arguments each one takes.
+
+Arguments are checked against the algorithm's own signature, so that a misspelt key or a text where a number belongs is
+found before anything runs. What would need code in a configuration (classes, noise objects) cannot be given, nor
+state-dependent exploration (use_sde) for algorithms whose policies it changes, so that the exported form no longer
+describes them: of PPO it changes the noise only.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+import types
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Union, get_args, get_origin
+
+import torch
+from sb3_contrib import TQC, RecurrentPPO
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.utils import LinearSchedule
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+from agents.training.config import OURS, Config
+from agents.training.critic import TwoViewPolicy, seen_places
+from dms_core.errors import InputError, choices
+
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "tqc": TQC, "recurrent_ppo": RecurrentPPO}
+ACTIVATIONS: dict[str, type[nn.Module]] = {
+    "tanh": nn.Tanh, "relu": nn.ReLU, "elu": nn.ELU, "silu": nn.SiLU, "leakyrelu": nn.LeakyReLU,
+}  # fmt: skip
+NOT_GIVEN = (
+    "self", "env", "policy", "tensorboard_log", "verbose", "seed", "device", "_init_setup_model", "action_noise",
+    "optimize_memory_usage", "observation_space", "action_space", "lr_schedule", "full_std", "use_expln",
+    "squash_output", "share_features_extractor", "normalize_images", "clip_mean", "use_sde_at_warmup",
+    "rollout_buffer_kwargs", "replay_buffer_kwargs", "features_extractor_kwargs",
+    "optimizer_kwargs", "lstm_kwargs",
+)  # fmt: skip
+STATE_DEPENDENT = {"use_sde", "sde_sample_freq"}
+SCHEDULE = re.compile(r"lin_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+"""A value that falls linearly from this one to 0 at the end of the training."""
+SQUASHED = ("sac", "tqc")
+"""Those whose actions are the tanh of what their networks say."""
+SMALL, NEARLY_ALL = 0.01, 0.99
+"""Share that is left of the weights of an output layer, Stable-Baselines3's gain for those of PPO; and the largest
+action at which a tanh is not yet so flat that nothing is learned."""
+SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
+"""Arguments that lie from 0 to 1, and above 0."""
+
+
+def find(name: str) -> type[BaseAlgorithm]:
+    """An algorithm by name.
+
+    Raises:
+        InputError: there is none of this name; lists those there are.
+    """
+    if name not in ALGORITHMS:
+        raise InputError(f"unknown algorithm '{name}'. There are: {choices(ALGORITHMS)}.")
+    return ALGORITHMS[name]
+
+
+def arguments(config: Config) -> dict[str, Any]:
+    """The algorithm's arguments, checked and made into what it takes.
+
+    Raises:
+        InputError: names algorithm, key and value.
+    """
+    name, algorithm = config.training.algorithm, find(config.training.algorithm)
+    if config.policy not in policies(name):
+        raise InputError(f"policy = '{config.policy}'; {name} takes {choices(policies(name))}.")
+    start, squashed = config.training.start, name in SQUASHED
+    if start is not None and squashed and max(map(abs, start)) > NEARLY_ALL:
+        raise InputError(f"training.start = {list(start)}; {name} takes from {-NEARLY_ALL} to {NEARLY_ALL}.")
+    if config.training.critic and (name, config.policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
+        raise InputError("training.critic is for the MlpPolicy of ppo, without frame_stack.")
+    _check(name, config.arguments, allowed(algorithm), OURS)
+    _check_ranges(name, config.arguments)
+    given = config.arguments.get("policy_kwargs", {})
+    _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
+    if squashed and start is None and "log_std_init" in given:
+        raise InputError(f"{name}: policy_kwargs: log_std_init does nothing without training.start.")
+    found = {k: _scheduled(v) for k, v in config.arguments.items()}
+    if given:
+        found["policy_kwargs"] = {k: activation(v) if k == "activation_fn" else v for k, v in given.items()}
+    return found
+
+
+def policies(name: str) -> list[str]:
+    """Policies for observations that are vectors."""
+    return [p for p in find(name).policy_aliases if p.startswith("Mlp")]
+
+
+def allowed(taker: Callable[..., Any]) -> dict[str, Any]:
+    """Keys that may be given, with their types."""
+    taken = inspect.signature(taker).parameters.values()
+    refused = {*NOT_GIVEN, *(STATE_DEPENDENT if any(taker is find(n) for n in SQUASHED) else ())}
+    return {p.name: p.annotation for p in taken if p.name not in refused and not p.name.endswith("_class")}
+
+
+def activation(name: str) -> type[nn.Module]:
+    """An activation by name: 'tanh' or 'nn.Tanh'.
+
+    Raises:
+        InputError: it is not one of those known.
+    """
+    key = str(name).rpartition(".")[2].lower().replace("_", "")
+    if key not in ACTIVATIONS:
+        raise InputError(f"policy_kwargs: activation_fn = '{name}'; one of {choices(ACTIVATIONS)} is wanted.")
+    return ACTIVATIONS[key]
+
+
+def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
+    """A fresh algorithm.
+
+    Raises:
+        InputError: the algorithm refuses its arguments.
+    """
+    given, critic = arguments(config), config.training.critic
+    policy: Any = config.policy
+    if critic:
+        seen = seen_places(worlds, critic, len(config.training.traces))
+        policy, given["policy_kwargs"] = TwoViewPolicy, given.get("policy_kwargs", {}) | {"seen": seen}
+    try:
+        found = find(config.training.algorithm)(
+            policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
+        )
+    except (AssertionError, ValueError, TypeError, RuntimeError) as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
+    if config.training.start is not None:
+        _begin_at(found.policy, torch.tensor(config.training.start))
+    return found
+
+
+def _begin_at(policy: Any, action: torch.Tensor) -> None:
+    """Make an untrained policy act near an action.
+
+    Output layers of PPO with `ortho_init` begin with weights so small that their bias is what they say. Others do not,
+    and the noise of SAC and TQC covers the range; they are brought to what PPO begins with. Their noise is that of
+    `log_std_init`, before the tanh, which they otherwise use for state-dependent exploration alone.
+    """
+    actor = getattr(policy, "actor", None)
+    with torch.no_grad():
+        if actor is None:
+            policy.action_net.weight *= 1.0 if policy.ortho_init else SMALL
+            policy.action_net.bias[:] = action
+            return
+        for layer, bias in ((actor.mu, torch.atanh(action)), (actor.log_std, torch.tensor(actor.log_std_init))):
+            layer.weight *= SMALL
+            layer.bias[:] = bias
+
+
+def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str] = ()) -> None:
+    """Refuses unknown keys and wrong types; `others`: keys that may stand beside these."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"{who} = {given!r}; a mapping is wanted.")
+    for key, value in given.items():
+        if key not in known:
+            raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices([*known, *others])}.")
+        if key != "activation_fn" and not fits(value, known[key]):
+            raise InputError(f"{who}: {key} = {value!r}; {_wanted(known[key])} is wanted.")
+
+
+def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
+    """Refuses numbers with which nothing is learned, of a fitting type; a schedule is judged by its start."""
+    for key, value in given.items():
+        number = float(value.removeprefix("lin_")) if isinstance(value, str) and SCHEDULE.fullmatch(value) else value
+        if key in SHARES and not 0.0 <= number <= 1.0:
+            raise InputError(f"{who}: {key} = {value!r}; a number from 0 to 1 is wanted.")
+        if key in POSITIVE and not 0.0 < number < math.inf:
+            raise InputError(f"{who}: {key} = {value!r}; a positive number is wanted.")
+
+
+def fits(value: Any, hint: Any) -> bool:
+    """Whether a value from a file is of an annotated type."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return any(fits(value, one) for one in inner)
+    if origin is Callable or hint is Callable or origin is not None and issubclass(origin, Callable):  # type: ignore[arg-type]
+        return isinstance(value, str) and SCHEDULE.fullmatch(value) is not None
+    if origin is tuple:
+        return isinstance(value, list | tuple) and len(value) == len(inner) and all(map(fits, value, inner))
+    if origin is list:
+        return isinstance(value, list | tuple) and all(fits(v, inner[0]) for v in value)
+    if origin is dict:
+        return isinstance(value, Mapping) and all(fits(v, inner[1]) for v in value.values())
+    if hint is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if hint is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    return value is None if hint in (None, type(None)) else hint is Any or isinstance(value, hint)
+
+
+def _wanted(hint: Any) -> str:
+    """A type in words."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return " or ".join(dict.fromkeys(_wanted(one) for one in inner))
+    plain = {float: "a number", int: "a whole number", bool: "true or false", str: "text", type(None): "null"}
+    if hint in plain:
+        return plain[hint]
+    if origin in (list, tuple):
+        return f"a list of {' and '.join(dict.fromkeys(_wanted(one) for one in inner))}"
+    return "a mapping" if origin is dict else "text like lin_3e-4"
+
+
+def _scheduled(value: Any) -> Any:
+    """What the algorithm takes for a value of a file."""
+    if isinstance(value, str) and SCHEDULE.fullmatch(value):
+        return LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
+    return tuple(value) if isinstance(value, list) else value

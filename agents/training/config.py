@@ -1,0 +1,209 @@
+"""A training's configuration: rl_zoo3's YAML format, read without running anything it holds.
+
+A file has a section named after the environment, with the algorithm's arguments by the names of Stable-Baselines3 and
+beside them n_envs, n_timesteps, policy, normalize, frame_stack and env_kwargs. A second section, `training`, which
+rl_zoo3 does not look at, says what it takes from its command line: how often to evaluate and to save.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import gymnasium
+from pydantic import Field
+
+from agents.evaluation.evaluate import ENVIRONMENT
+from agents.training.rl_zoo_text import plain, read_call, write_call
+from dms_core.errors import InputError, choices
+from dms_core.yaml_text import read_value, read_yaml
+from exo_env.settings import Settings
+
+ENVIRONMENT_ID = ENVIRONMENT.partition(":")[2]
+TRAINING = "training"
+MAPPINGS = ("policy_kwargs", "env_kwargs", "normalize")
+"""Keys whose mapping may stand as text."""
+ALIASES = {"ppo_lstm": "recurrent_ppo"}
+"""rl_zoo3's name of an algorithm to that of Stable-Baselines3."""
+
+Component = Annotated[float, Field(ge=-1.0, le=1.0)]
+"""Of an action."""
+
+
+class Training(Settings):
+    """How a run is watched and kept."""
+
+    algorithm: str = Field(description="name, see algorithms.py")
+    eval_every: int = Field(default=50_000, ge=1, description="steps between two evaluations")
+    eval_patients: int = Field(default=10, ge=1, le=1000, description="episodes of an evaluation")
+    eval_seed: int = Field(default=20_251_013, ge=0, description="of its patients, the same ones every time")
+    save_every: int = Field(default=50_000, ge=1, description="steps between two checkpoints")
+    threads: int = Field(default=1, ge=1, le=256, description="of PyTorch; small networks gain nothing from more")
+    traces: tuple[float, ...] = Field(
+        default=(), max_length=8, description="time constants of filtered observations beside each one [s], traces.py"
+    )
+    hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held, see hold.py")
+    start: tuple[Component, Component] | None = Field(
+        default=None, description="action of the untrained policy, from which it learns to differ; None: 0 and 0"
+    )
+    against: tuple[Component, Component] | None = Field(
+        default=None,
+        description="action whose reward on the same patient is taken off that of training, see paired.py; None: none",
+    )
+    critic: tuple[str, ...] = Field(
+        default=(), description="groups of the observation that only PPO's critic sees, see critic.py"
+    )
+    device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?|mps|auto)$", description="of PyTorch")
+
+
+@dataclass(frozen=True)
+class Config:
+    """What to train, and how."""
+
+    training: Training
+    n_envs: int
+    n_timesteps: int
+    policy: str
+    env_kwargs: dict[str, Any]
+    normalize: dict[str, Any] | None
+    """Arguments of VecNormalize; None: nothing is normalised."""
+    frame_stack: int
+    """Observations that the policy sees at once."""
+    arguments: dict[str, Any]
+    """Of the algorithm, not yet checked: algorithms.py knows them."""
+    section: dict[str, Any]
+    """The environment's section as given, overrides included."""
+
+    @classmethod
+    def read(cls, path: str | Path, overrides: Sequence[str] = ()) -> Self:
+        """A configuration file, some values replaced.
+
+        Args:
+            path: the algorithm is named after it unless its `training` section says otherwise.
+            overrides: `key=value` or `key.key=value`, the value in YAML; keys of the environment's section, or of
+                `training` as `training.key`.
+
+        Raises:
+            InputError: names file, key and value.
+        """
+        path = Path(path)
+        try:
+            return cls.of(read_yaml(path), path.stem, overrides)
+        except InputError as error:
+            said = str(error)
+            raise InputError(said if str(path) in said else f"{path}: {said}") from None
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any], name: str, overrides: Sequence[str] = ()) -> Self:
+        """A configuration from a file's content; `name` is the algorithm where the content does not say."""
+        section, training = _sections(content)
+        for override in overrides:
+            _override(section, training, override)
+        training.setdefault("algorithm", name)
+        training["algorithm"] = ALIASES.get(training["algorithm"], training["algorithm"])
+        rest = {k: v for k, v in section.items() if k not in OURS}
+        policy = section.get("policy", "MlpPolicy")
+        if not isinstance(policy, str):
+            raise InputError(f"policy = {policy!r}; the name of a policy is wanted.")
+        return cls(
+            training=Training(**training),
+            n_envs=_whole("n_envs", section.get("n_envs", 1)),
+            n_timesteps=_whole("n_timesteps", _needed(section, "n_timesteps")),
+            policy=policy,
+            env_kwargs=_mapping("env_kwargs", section.get("env_kwargs", {})),
+            normalize=_normalisation(section.get("normalize", False), section),
+            frame_stack=_whole("frame_stack", section.get("frame_stack", 1)),
+            arguments=rest,
+            section=section,
+        )
+
+    def content(self) -> dict[str, Any]:
+        """What a file of this configuration holds; rl_zoo3 reads it too."""
+        section = {k: write_call(v) if k == "policy_kwargs" else plain(v) for k, v in self.section.items()}
+        return {ENVIRONMENT_ID: section, TRAINING: self.training.model_dump()}
+
+
+OURS = ("n_envs", "n_timesteps", "policy", "normalize", "frame_stack", "env_kwargs")
+NORMALISATION = {"norm_obs": bool, "norm_reward": bool, "clip_obs": float, "clip_reward": float, "epsilon": float}
+"""Arguments of VecNormalize that may be given, with their types; gamma is the algorithm's."""
+
+
+def _sections(content: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The environment's section and ours."""
+    if ENVIRONMENT_ID not in content:
+        others = [k for k in content if k != TRAINING]
+        registered = [k for k in gymnasium.registry if k.startswith("exo/")] or [ENVIRONMENT_ID]
+        raise InputError(
+            f"the configuration is for {choices(others) if others else 'no environment'}; "
+            f"here there is {choices(registered)}."
+        )
+    section, training = content[ENVIRONMENT_ID], content.get(TRAINING, {})
+    for name, value in ((ENVIRONMENT_ID, section), (TRAINING, training)):
+        if not isinstance(value, Mapping):
+            raise InputError(f"section '{name}' holds {value!r}; a mapping of keys to values is wanted.")
+    found = dict(section)
+    for key in MAPPINGS:
+        if isinstance(found.get(key), str):
+            try:
+                found[key] = read_call(found[key])
+            except InputError as error:
+                raise InputError(f"{key}: {error}") from None
+    return found, dict(training)
+
+
+def _override(section: dict[str, Any], training: dict[str, Any], text: str) -> None:
+    """Replace one value."""
+    key, equals, value = text.partition("=")
+    path = key.strip().split(".")
+    if not equals or not all(path):
+        raise InputError(f"--set {text}: key=value is wanted, for example n_timesteps=1000.")
+    place: Any = section
+    if path[0] == TRAINING and len(path) > 1:
+        place, path = training, path[1:]
+    for part in path[:-1]:
+        place[part] = dict(place.get(part) or {}) if isinstance(place.get(part), Mapping | None) else None
+        place = place[part]
+        if place is None:
+            raise InputError(f"--set {text}: '{part}' is not a mapping.")
+    found = read_value(value)
+    place[path[-1]] = read_call(found) if path[-1] in MAPPINGS and isinstance(found, str) else found
+
+
+def _needed(section: Mapping[str, Any], key: str) -> Any:
+    if key not in section:
+        raise InputError(f"'{key}' is missing.")
+    return section[key]
+
+
+def _whole(key: str, value: Any) -> int:
+    """A whole number from 1; 1e6 is one."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value) or value < 1:
+        raise InputError(f"{key} = {value!r}; a whole number from 1 is wanted.")
+    return int(value)
+
+
+def _mapping(key: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(f"{key} = {value!r}; a mapping is wanted.")
+    return dict(value)
+
+
+def _normalisation(value: Any, section: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Arguments of VecNormalize, or None."""
+    if isinstance(value, bool):
+        given: dict[str, Any] = {}
+        if not value:
+            return None
+    else:
+        given = _mapping("normalize", value)
+    for key, one in given.items():
+        if key not in NORMALISATION:
+            raise InputError(f"normalize: unknown key '{key}'. Allowed: {choices(NORMALISATION)}.")
+        kinds = (bool,) if NORMALISATION[key] is bool else (int, float)
+        if not isinstance(one, kinds) or (bool not in kinds and (isinstance(one, bool) or one <= 0)):
+            wanted = "true or false" if bool in kinds else "a positive number"
+            raise InputError(f"normalize: {key} = {one!r}; {wanted} is wanted.")
+    gamma = section.get("gamma")
+    return given | ({"gamma": gamma} if isinstance(gamma, float) else {})

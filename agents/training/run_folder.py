@@ -1,0 +1,131 @@
+"""The folder of a training: what was run, with what, how far it came.
+
+run.json          seed, command lines, versions, git revision
+config.yml        the configuration, overrides included; rl_zoo3 reads it too
+evaluations.json  the learning curve
+checkpoints/      what the training goes on from
+best/             the best policy so far, by its mean return
+tensorboard/
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shlex
+import sys
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from agents.provenance import revision, versions
+from agents.training.checkpoint import Store
+from agents.training.config import ENVIRONMENT_ID, Config
+from dms_core.errors import InputError
+from dms_core.output_file import check_writable, whole_file, write_json
+
+RECORD, CONFIG, EVALUATIONS, LOCK = "run.json", "config.yml", "evaluations.json", ".lock"
+
+
+class RunFolder:
+    """Places and records of a training.
+
+    Args:
+        path: of the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.checkpoints, self.best = Store(path / "checkpoints", keep=2), Store(path / "best")
+
+    def begin(self, config: Config, seed: int) -> None:
+        """A new training.
+
+        Raises:
+            InputError: the folder is in use, or is a file.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"output '{self.path}' is a file; a new or empty folder is wanted.")
+        # A start that was killed before its record was written leaves no more than these.
+        if self.path.is_dir() and {p.name for p in self.path.iterdir()} - {CONFIG, LOCK}:
+            hint = f"go on with --resume {self.path}, or" if (self.path / RECORD).is_file() else ""
+            raise InputError(f"output '{self.path}' is not empty; {hint} choose another --out.".replace("  ", " "))
+        check_writable(self.path / RECORD)
+        self.write_config(config)
+        record = {
+            "environment": ENVIRONMENT_ID, "algorithm": config.training.algorithm, "seed": seed,
+            "sessions": [_session()],
+        }  # fmt: skip
+        write_json(self.path / RECORD, record)
+
+    def go_on(self, overrides: tuple[str, ...]) -> tuple[Config, int]:
+        """Configuration and seed of a training that was begun; what goes on is recorded.
+
+        Raises:
+            InputError: the folder holds no training, or one of another environment.
+        """
+        record = read_record(self.path)
+        if record.get("environment") != ENVIRONMENT_ID:
+            raise InputError(f"'{self.path}' is of {record.get('environment')}; here there is {ENVIRONMENT_ID}.")
+        config = Config.read(self.path / CONFIG, overrides)
+        if overrides:
+            self.write_config(config)
+        record["sessions"].append(_session())
+        write_json(self.path / RECORD, record)
+        return config, int(record["seed"])
+
+    def write_config(self, config: Config) -> None:
+        """Keep the configuration."""
+        with whole_file(self.path / CONFIG) as file:
+            yaml.safe_dump(config.content(), file, sort_keys=False, width=120)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Only one process trains in the folder; the lock falls with the process.
+
+        Raises:
+            InputError: another process is at it.
+        """
+        try:
+            import fcntl
+        except ImportError:  # Windows; two trainings in one folder go unnoticed there.
+            yield
+            return
+        with (self.path / LOCK).open("a+") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise InputError(f"another process is training in '{self.path}'.") from None
+            file.truncate(0)
+            file.write(f"{os.getpid()}\n")
+            file.flush()
+            yield
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """run.json of a folder.
+
+    Raises:
+        InputError: there is none, or it is not whole.
+    """
+    try:
+        record = json.loads((path / RECORD).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"'{path}' is not the folder of a training: {RECORD}: {error.strerror}.") from None
+    except ValueError as error:
+        raise InputError(f"'{path / RECORD}' is no JSON: {error}.") from None
+    if not isinstance(record, dict) or not {"environment", "seed", "sessions"} <= record.keys():
+        raise InputError(f"'{path / RECORD}' is not the record of a training.")
+    return record
+
+
+def _session() -> dict[str, Any]:
+    """One start of a training."""
+    return {
+        "started": datetime.now(UTC).isoformat(timespec="seconds"), "command": shlex.join(sys.orig_argv),
+        "versions": versions(), "git": revision(),
+    }  # fmt: skip

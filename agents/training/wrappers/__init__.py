@@ -1,0 +1,1 @@
+"""Wrappers of the vector environment that only training uses."""

@@ -1,0 +1,68 @@
+"""Calling functions by their addresses, from inside compiled code.
+
+An element's kernel is an ordinary `numba.njit` function, so that it can be called, tested and cached like any other.
+The compiled loops know it only by the address of its machine code (of its entry, see entries.py): one loop, compiled
+and cached once, serves every element that exists or that a user writes later.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from numba import types
+from numba.extending import intrinsic
+
+_TABLE = types.Array(types.int64, 2, "C")
+PART = types.void(_TABLE, _TABLE)
+ENTRY = types.void(_TABLE, types.int64, _TABLE, types.int64)
+SIGNAL = types.void(types.float64, types.Array(types.float64, 1, "C"))
+TABLE_CALL = types.void(_TABLE)
+"""Of a function of one packed table, see `call_with_table`."""
+
+
+@cache
+def address(function: Any, signature: Any) -> int:
+    """Compile `function` for `signature` (or load it from numba's cache) and give the address of its code.
+
+    Found once for each function: asking numba again takes longer than a step.
+    """
+    function.compile(signature)
+    compiled = function.get_compile_result(signature)
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+
+
+def _call_by_address(signature: Any) -> Any:
+    """Code generator of a call with numba's own calling convention to the address in the first argument."""
+
+    def codegen(context, builder, sig, args):
+        target = context.call_conv.get_function_type(types.none, signature.args)
+        function = builder.inttoptr(args[0], target.as_pointer())
+        context.call_conv.call_function(builder, function, types.none, signature.args, args[1:])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, *signature.args), codegen
+
+
+@intrinsic
+def call_entry(typingctx, address, calls, e, w, level):
+    """Call the entry of a kernel."""
+    return _call_by_address(ENTRY)
+
+
+@intrinsic
+def call_signal(typingctx, address, t, out):
+    """Call a compiled function of time."""
+    return _call_by_address(SIGNAL)
+
+
+@intrinsic
+def call_part(typingctx, address, m, s):
+    """Call a part of a step."""
+    return _call_by_address(PART)
+
+
+@intrinsic
+def call_with_table(typingctx, address, table):
+    """Call a compiled function of one packed table; it gives nothing back."""
+    return _call_by_address(TABLE_CALL)

@@ -1,0 +1,136 @@
+"""Kernels as the loops call them: by the address of a small function that finds a kernel's arrays.
+
+An element's kernel takes a dozen arrays, each of them seven or nine machine words to numba; handing them over would
+take as long as many a kernel runs. Its entry takes the packed tables instead, and the kernel is compiled into it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.extending import is_jitted
+
+from dms_core.assembly.layout import Call, Layout
+from dms_core.assembly.tables import CALLS, WORK, Calls, flat
+from dms_core.compiled.arena import floats, indices, ints, matrix
+from dms_core.compiled.calls import ENTRY, address
+from dms_core.compiled.compilation import fingerprint
+from dms_core.compiled.jit import compiled
+from dms_core.errors import ModelError
+from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
+
+_kernel: Any = None
+"""In the globals of an entry: the kernel that it is for."""
+
+
+@compiled
+def integers_of(calls, e):
+    """Integers of call e."""
+    ptr = ints(calls, CALLS.ip_ptr)
+    return indices(calls, CALLS.ip)[ptr[e] : ptr[e + 1]]
+
+
+@compiled
+def numbers_of(calls, e):
+    """Numbers of call e."""
+    ptr = ints(calls, CALLS.par_ptr)
+    return floats(calls, CALLS.par)[ptr[e] : ptr[e + 1]]
+
+
+def _dynamic(calls, e, w, level):  # noqa: ANN001, ANN202
+    _kernel(
+        integers_of(calls, e), numbers_of(calls, e), floats(w, WORK.q_l), floats(w, WORK.v_l), floats(w, WORK.a_l),
+        matrix(w, WORK.u_l), level, floats(w, WORK.r_l), matrix(w, WORK.Jq), matrix(w, WORK.Jv), matrix(w, WORK.Ja),
+    )  # fmt: skip
+
+
+def _constraint(calls, e, w, level):  # noqa: ANN001, ANN202
+    _kernel(
+        integers_of(calls, e), numbers_of(calls, e), floats(w, WORK.q_l), floats(w, WORK.v_l), floats(w, WORK.lam_l),
+        matrix(w, WORK.u_l), level, floats(w, WORK.phi_l), matrix(w, WORK.phi_t_l), matrix(w, WORK.G),
+        matrix(w, WORK.W), matrix(w, WORK.H),
+    )  # fmt: skip
+
+
+def _sensor(calls, e, w, level):  # noqa: ANN001, ANN202
+    _kernel(
+        integers_of(calls, e), numbers_of(calls, e), floats(w, WORK.q_l), floats(w, WORK.v_l), floats(w, WORK.a_l),
+        floats(w, WORK.lam_l), matrix(w, WORK.u_l), level, floats(w, WORK.y_l), matrix(w, WORK.Yq),
+        matrix(w, WORK.Yv), matrix(w, WORK.Ya), matrix(w, WORK.Yl), matrix(w, WORK.Yu),
+    )  # fmt: skip
+
+
+_ENTRIES = {DYNAMIC: _dynamic, CONSTRAINT: _constraint, SENSOR: _sensor}
+
+
+@cache
+def _state_of_package() -> str:
+    return fingerprint()[:12]
+
+
+@cache
+def entry(kernel: Any, signature: Any) -> Any:
+    """The function (calls, e, w, level) that runs `kernel` on the local arrays of call e.
+
+    It counts as a function of the kernel's file, where numba keeps its machine code if it keeps the kernel's; the
+    places of the arrays are part of that code, so the state of this package is part of the name. What a kernel takes
+    from a function around it numba would not see, so such an entry is not kept.
+    """
+    function, form = kernel.py_func, _ENTRIES[signature]
+    name, origin = f"{function.__name__}_entry_{_state_of_package()}", function.__code__
+    code = form.__code__.replace(
+        co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
+    )
+    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+    options = {k: v for k, v in kernel.targetoptions.items() if k not in ("nopython", "cache")}
+    within = njit(function, locals=kernel.locals, **{**options, **habits, "forceinline": True})
+    known = {**form.__globals__, "_kernel": within}
+    found = FunctionType(code, known, name)
+    found.__module__, found.__qualname__ = function.__module__, name
+    kept = kernel.stats.cache_path is not None and function.__closure__ is None
+    return njit(found, cache=kept, **habits)
+
+
+def call_tables(calls: list[Call], signature: Any) -> Calls:
+    """Tables of all calls of one kind; kernels are compiled here, or loaded from numba's cache.
+
+    Raises:
+        ModelError: a kernel is no function compiled by numba.
+    """
+    addresses = []
+    for call in calls:
+        element = call.element
+        kernel: Any = type(element).kernel
+        if kernel is not None and not is_jitted(kernel):
+            raise ModelError(
+                f"{element.kind} '{element.name}': its kernel is {kernel!r}; a function decorated with numba.njit is "
+                "wanted."
+            )
+        addresses.append(0 if kernel is None else address(entry(kernel, signature), ENTRY))
+    return Calls(
+        np.array(addresses, np.int64),
+        *flat([c.iq for c in calls], np.int32),
+        *flat([c.iu for c in calls], np.int32),
+        *flat([c.placement.integers for c in calls], np.int32),
+        *flat([c.placement.numbers for c in calls], np.float64),
+        np.array([c.row for c in calls] + [sum(c.rows for c in calls)], np.int64),
+        np.arange(len(calls)),
+    )
+
+
+def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:
+    """Tables of dynamics, constraints and sensors; every call counts as moving."""
+    return (
+        call_tables(layout.dynamics, DYNAMIC),
+        call_tables(layout.constraints, CONSTRAINT),
+        call_tables(layout.sensors, SENSOR),
+    )
+
+
+def moving_calls(calls: list[Call], free: np.ndarray) -> np.ndarray:
+    """Numbers of the calls that see a coordinate which is solved for."""
+    return np.array([e for e, c in enumerate(calls) if np.isin(c.iq, free).any()], np.int64)

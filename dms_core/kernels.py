@@ -1,0 +1,75 @@
+"""The public face for compiled code of other packages: what a kernel, a task or a batch of worlds is written with.
+
+A world is two packed tables (arena.py): m, its constant tables (`World.tables`), and s, its state (`World.packed`).
+Compiled code takes views of their fields by name and calls, without touching a Python object:
+
+    advance(m, s, o, t_end, record, 0)    steps to t_end; gives (code, rows recorded)
+    restart(m, s, o)                      accelerations and multipliers behind a jump; False if there are none
+    rewind(s, q, v, step)                 back to t = 0 at other coordinates and rates
+    read_sensors(sensing, signals, t, q, v, vd, lam, behind, y)     all sensors of one state
+    constraint_gap(m, s)                  largest |phi| of the present state
+
+with o an `Options` (`SolverOptions.numbers()`). A function of one packed table can be called by its address: `address`
+gives it, `call_with_table` calls it, and one compiled loop serves every function that exists or is written later.
+"""
+
+from dms_core.assembly.sensing import read_sensors
+from dms_core.assembly.tables import SIGNALS
+from dms_core.compiled.arena import (
+    Packed,
+    fields,
+    flags,
+    floats,
+    indices,
+    inner,
+    ints,
+    matrix,
+    naturals,
+    number,
+    table_at,
+)
+from dms_core.compiled.calls import TABLE_CALL, address, call_with_table
+from dms_core.compiled.compilation import drop_stale_code
+from dms_core.compiled.jit import compiled
+from dms_core.simulation.newton import largest_errors
+from dms_core.simulation.parts import CONSTRAINTS, run_part
+from dms_core.simulation.state import MODEL, STATE, Options, T, rewind
+from dms_core.simulation.step_control import DONE, MATRIX_SINGULAR, advance, restart
+
+__all__ = [
+    "DONE",
+    "MATRIX_SINGULAR",
+    "MODEL",
+    "SIGNALS",
+    "STATE",
+    "TABLE_CALL",
+    "Options",
+    "Packed",
+    "T",
+    "address",
+    "advance",
+    "call_with_table",
+    "compiled",
+    "constraint_gap",
+    "drop_stale_code",
+    "fields",
+    "flags",
+    "floats",
+    "indices",
+    "inner",
+    "ints",
+    "matrix",
+    "naturals",
+    "number",
+    "read_sensors",
+    "restart",
+    "rewind",
+    "table_at",
+]
+
+
+@compiled
+def constraint_gap(m, s):
+    """Largest |phi| of the present state [m or -]."""
+    run_part(m, s, CONSTRAINTS)
+    return largest_errors(s)[0]

@@ -1,0 +1,1 @@
+"""Geometry that several elements share; it knows no force."""

@@ -1,0 +1,1 @@
+"""Drives: what an action does to the device (contract: drive.py)."""

@@ -1,0 +1,283 @@
+"""The subject: torso, humerus and forearm (ulna, radius and hand) of arm26 with its six muscles, scaled to a person.
+
+Shoulder at 0, so that all frames are parallel to ground where the elbow is straight; the elbow turns about arm26's own
+tilted axis. Muscles run straight through their points: below 8 degrees BRA passes behind the elbow axis and beyond
+70 degrees the triceps lose leverage, so exercises stay within 20 to 100 degrees.
+
+Scaling from arm26 (index 0) to a person of mass M, height H and sex s, with the segment fractions of de Leva (1996),
+J. Biomech. 29:1223-1230:
+
+    mass     m  = m_0  (M / M_0) (mass fraction_s / mass fraction_male)
+    length   l  = l_0  k,   k = (H / H_0) (length fraction_s / length fraction_male), per segment
+    inertia  J  = J_0  (m / m_0) k^2
+    muscle   L0 and Ls with the length of the whole path at 90 degrees; F0 = F0_0 strength (M / M_0) / (H / H_0),
+             since muscle volume goes with body mass and force with volume over fibre length
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from math import radians
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from dms_core.config_files import config_file
+from dms_core.model import GROUND, Fixed, PathPoint, Revolute, RigidBody, ThelenMuscle
+from dms_core.model.element import Constraint, Vector
+from dms_core.model.geometry.frames import quaternion, rotation_matrix, unit
+from dms_core.yaml_text import read_yaml
+from exo_env.settings import Settings
+
+MUSCLES = ("TRIlong", "TRIlat", "TRImed", "BIClong", "BICshort", "BRA")
+FLEXORS = ("BIClong", "BICshort", "BRA")
+EXTENSORS = ("TRIlong", "TRIlat", "TRImed")
+SUBJECT_FILE = "subject/arm26.yaml"
+BODIES = {"torso": "base", "humerus": "r_humerus", "forearm": "r_ulna_radius_hand"}
+"""Our names and those of the model file."""
+ELBOW = "elbow"
+MASS_0, HEIGHT_0 = 68.8034, 1.741
+"""Body mass [kg] and height [m] of arm26. Inference: its segment masses are de Leva's male fractions of 68.8034 kg, and
+its forearm's centre of mass is that of de Leva's mean male forearm and hand, whose stature is 1.741 m."""
+MASS_FRACTION = {
+    "male": {"torso": 0.4346, "humerus": 0.0271, "forearm": 0.0162 + 0.0061},
+    "female": {"torso": 0.4257, "humerus": 0.0255, "forearm": 0.0138 + 0.0056},
+}
+"""Segment over body mass (de Leva 1996, table 4); the forearm with the hand."""
+LENGTH_FRACTION = {
+    "male": {"torso": 0.6033 / 1.741, "humerus": 0.2817 / 1.741, "forearm": 0.2689 / 1.741},
+    "female": {"torso": 0.6148 / 1.735, "humerus": 0.2751 / 1.735, "forearm": 0.2643 / 1.735},
+}
+"""Segment length over height (de Leva 1996, table 4)."""
+GRIP = (0.0, -0.337, 0.0)
+"""Centre of the grip in the forearm's frame [m]: de Leva's centre of mass of the hand, 0.2689 + 0.79 x 0.0862 m."""
+TORSO_RADIUS = 0.17
+"""Radius of gyration of the torso about every axis [m], assumed; without effect, since it is fixed to ground."""
+
+
+class Person(Settings):
+    """Who is in the device. The defaults are arm26 unchanged."""
+
+    body_mass: float = Field(default=MASS_0, ge=20.0, le=250.0, description="body mass M [kg]")
+    height: float = Field(default=HEIGHT_0, ge=1.0, le=2.3, description="height H [m]")
+    sex: Literal["male", "female"] = Field(default="male", description="whose segment fractions are used")
+    strength: float = Field(default=1.0, gt=0.0, le=5.0, description="factor on every muscle's F0 [-]")
+
+
+@cache
+def _facts() -> dict[str, Any]:
+    """The file of arm26, read once."""
+    return read_yaml(config_file(SUBJECT_FILE))
+
+
+class Segment(NamedTuple):
+    """A scaled body."""
+
+    mass: float
+    """[kg]"""
+    centre_of_mass: np.ndarray
+    """In its frame [m]."""
+    inertia: np.ndarray
+    """Principal, about the centre of mass, in its frame [kg m^2]."""
+    origin: np.ndarray
+    """Origin of its frame in ground axes [m]; the forearm's is the elbow centre."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The arm of a person: what the simulated subject is made of, and what a subject knows of itself.
+
+    Args:
+        person: whom to scale arm26 to.
+    """
+
+    person: Person = Person()
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The file of arm26."""
+        return _facts()
+
+    @property
+    def gravity(self) -> Vector:
+        """In ground axes [m/s^2]."""
+        x, y, z = self.facts["gravity"]
+        return (x, y, z)
+
+    def length_factor(self, body: str) -> float:
+        """k of a segment [-]."""
+        by_sex = LENGTH_FRACTION[self.person.sex][body] / LENGTH_FRACTION["male"][body]
+        return self.person.height / HEIGHT_0 * by_sex
+
+    def mass_factor(self, body: str) -> float:
+        """m / m_0 of a segment [-]."""
+        by_sex = MASS_FRACTION[self.person.sex][body] / MASS_FRACTION["male"][body]
+        return self.person.body_mass / MASS_0 * by_sex
+
+    @cached_property
+    def segments(self) -> dict[str, Segment]:
+        """The scaled bodies by our names."""
+        joints = self.facts["joints"]
+        at = np.array(joints["offset"]["point_i"])
+        found = {}
+        offset = {
+            "torso": np.zeros(3),
+            "humerus": joints["r_shoulder"]["point_i"],
+            "forearm": joints["r_elbow"]["point_i"],
+        }
+        parent = {"torso": "torso", "humerus": "torso", "forearm": "humerus"}
+        for name, their_name in BODIES.items():
+            body, k, f = self.facts["bodies"][their_name], self.length_factor(name), self.mass_factor(name)
+            at = at + self.length_factor(parent[name]) * np.asarray(offset[name])
+            mass, inertia = f * body["mass"], f * k * k * np.array(body["inertia"])
+            if name == "torso":
+                mass = MASS_FRACTION[self.person.sex]["torso"] * self.person.body_mass
+                inertia = np.full(3, mass * TORSO_RADIUS**2)
+            found[name] = Segment(mass, k * np.array(body["centre_of_mass"]), inertia, at)
+        return found
+
+    @cached_property
+    def axis(self) -> np.ndarray:
+        """Elbow axis, flexion positive, in humerus and ground axes [-]."""
+        return unit(self.facts["joints"]["r_elbow"]["axis_i"], "elbow axis")
+
+    @property
+    def elbow(self) -> np.ndarray:
+        """Elbow centre in ground axes [m]."""
+        return self.segments["forearm"].origin
+
+    @property
+    def grip(self) -> np.ndarray:
+        """Centre of the grip in the forearm's frame [m]."""
+        return self.length_factor("forearm") * np.array(GRIP)
+
+    def rotation(self, flexion: float) -> np.ndarray:
+        """A of the forearm at an elbow angle [rad], shape (3, 3)."""
+        return rotation_matrix(quaternion(self.axis, flexion))
+
+    def bodies(self, flexion: float) -> list[RigidBody]:
+        """Torso, humerus and forearm with the elbow at `flexion` [rad], at rest."""
+        turn = {"forearm": tuple(quaternion(self.axis, flexion))}
+        return [
+            RigidBody(
+                name=name,
+                mass=s.mass,
+                inertia=tuple(s.inertia),
+                centre_of_mass=tuple(s.centre_of_mass),
+                position=tuple(s.origin),
+                orientation=turn.get(name, (1.0, 0.0, 0.0, 0.0)),
+            )
+            for name, s in self.segments.items()
+        ]
+
+    def joints(self) -> list[Constraint]:
+        """Torso fixed to ground, humerus fixed to torso, elbow."""
+        s = self.segments
+        shoulder = tuple(s["humerus"].origin - s["torso"].origin)
+        elbow = tuple(s["forearm"].origin - s["humerus"].origin)
+        return [
+            Fixed(name="torso_mount", body_j="torso", point_i=tuple(s["torso"].origin)),
+            Fixed(name="shoulder", body_i="torso", body_j="humerus", point_i=shoulder),
+            Revolute(
+                name=ELBOW, body_i="humerus", body_j="forearm", point_i=elbow, point_j=(0.0, 0.0, 0.0),
+                axis_i=tuple(self.axis), axis_j=tuple(self.axis),
+            ),
+        ]  # fmt: skip
+
+    def path(self, muscle: str, *, welded: bool = False) -> tuple[PathPoint, ...]:
+        """Points of a muscle; with `welded`, torso and humerus are parts of the ground."""
+        if (muscle, welded) not in self._paths:
+            self._paths[muscle, welded] = self._path(muscle, welded)
+        return self._paths[muscle, welded]
+
+    @cached_property
+    def _paths(self) -> dict[tuple[str, bool], tuple[PathPoint, ...]]:
+        """Of the muscles asked for so far."""
+        return {}
+
+    def _path(self, muscle: str, welded: bool) -> tuple[PathPoint, ...]:
+        ours = {theirs: name for name, theirs in BODIES.items()}
+        points = []
+        for p in self.facts["muscles"][muscle]["path"]:
+            body = ours[p["body"]]
+            x = self.length_factor(body) * np.array(p["point"])
+            if welded and body != "forearm":
+                points.append(PathPoint(body=GROUND, point=tuple(x + self.segments[body].origin)))
+            else:
+                points.append(PathPoint(body=body, point=tuple(x)))
+        return tuple(points)
+
+    def muscle_geometry(self, muscle: str, flexion: float) -> tuple[float, float]:
+        """(length [m], moment arm -dl/dtheta [m], positive for a flexor) at an elbow angle [rad]."""
+        return _path_geometry(self, self.path(muscle, welded=True), flexion)
+
+    def muscle(self, name: str, **more: Any) -> ThelenMuscle:
+        """A muscle of the person; `more` are further fields of ThelenMuscle, or others in place of these."""
+        if more:
+            return self._muscle(name, more)
+        if name not in self._muscles:
+            self._muscles[name] = self._muscle(name, {})
+        return self._muscles[name]
+
+    @cached_property
+    def _muscles(self) -> dict[str, ThelenMuscle]:
+        """Those asked for so far, as they are."""
+        return {}
+
+    def _muscle(self, name: str, more: dict[str, Any]) -> ThelenMuscle:
+        facts = {**self.facts["muscle_defaults"], **self.facts["muscles"][name]}
+        k = self._path_factors[name]
+        size = self.person.strength * self.person.body_mass / MASS_0 * HEIGHT_0 / self.person.height
+        facts |= {
+            "max_isometric_force": size * facts["max_isometric_force"],
+            "optimal_fibre_length": k * facts["optimal_fibre_length"],
+            "tendon_slack_length": k * facts["tendon_slack_length"],
+            "path": self.path(name),
+        }
+        return ThelenMuscle(**{"name": name, "excitation": excitation_name(name), **facts, **more})
+
+    @cached_property
+    def _path_factors(self) -> dict[str, float]:
+        """Length of each muscle's scaled path over that of arm26, at 90 degrees [-]."""
+        if self.person.height == HEIGHT_0 and self.person.sex == "male":
+            return dict.fromkeys(MUSCLES, 1.0)
+        return {name: self.muscle_geometry(name, radians(90.0))[0] / x for name, x in _path_lengths().items()}
+
+    def inertia_about_elbow(self) -> float:
+        """Generalised inertia of the forearm about the elbow axis [kg m^2]."""
+        s = self.segments["forearm"]
+        lever = np.cross(self.axis, s.centre_of_mass)
+        return float(self.axis @ (s.inertia * self.axis) + s.mass * lever @ lever)
+
+    def gravity_moment(self, flexion: float) -> float:
+        """Moment of the forearm's weight about the elbow axis [Nm], negative where it extends."""
+        s = self.segments["forearm"]
+        lever = self.rotation(flexion) @ s.centre_of_mass
+        return float(self.axis @ np.cross(lever, s.mass * np.array(self.gravity)))
+
+
+@cache
+def _path_lengths() -> dict[str, float]:
+    """Of arm26's muscles at 90 degrees [m]."""
+    return {name: Arm().muscle_geometry(name, radians(90.0))[0] for name in MUSCLES}
+
+
+def excitation_name(muscle: str) -> str:
+    """Name of the input that excites a muscle."""
+    return f"excitation.{muscle}"
+
+
+def _path_geometry(arm: Arm, points: tuple[PathPoint, ...], flexion: float) -> tuple[float, float]:
+    """Length and moment arm of a path through ground and forearm points."""
+    A, length, moment_arm = arm.rotation(flexion), 0.0, 0.0
+    x = [arm.elbow + A @ np.array(p.point) if p.body == "forearm" else np.array(p.point) for p in points]
+    for a, b, pa, pb in zip(x[:-1], x[1:], points[:-1], points[1:], strict=True):
+        d = b - a
+        segment = float(np.linalg.norm(d))
+        length += segment
+        for point, p, sign in ((b, pb, 1.0), (a, pa, -1.0)):
+            if p.body == "forearm":
+                moment_arm -= sign * float(np.cross(arm.axis, point - arm.elbow) @ d) / segment
+    return length, moment_arm

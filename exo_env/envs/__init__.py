@@ -1,0 +1,1 @@
+"""The environments, one file an id, and what all of them share."""

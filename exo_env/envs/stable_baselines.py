@@ -1,0 +1,91 @@
+"""The vector environment as a VecEnv of Stable-Baselines3; the only module here that needs that library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv
+
+from dms_core.errors import InputError
+from exo_env.envs.vector_env import ElbowLiftVectorEnv
+
+
+class ElbowLiftVecEnv(VecEnv):
+    """N worlds that reset by themselves; infos of an ended episode have what SB3 looks for.
+
+    `terminal_observation` is the last observation, and `TimeLimit.truncated` tells an episode that time ended from one
+    that an event did, so that value estimates bootstrap where they should. An ended episode's time, effort and
+    solver_failed are in it too.
+
+    Args:
+        num_envs: number of worlds.
+        threads: that step them; None takes one for each core.
+        settings: of ElbowLiftEnv.
+    """
+
+    def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:
+        self.worlds = ElbowLiftVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **settings)
+        self.render_mode = self.worlds.render_mode
+        self.metadata = self.worlds.metadata
+        super().__init__(num_envs, self.worlds.single_observation_space, self.worlds.single_action_space)
+        self._actions: np.ndarray | None = None
+
+    def reset(self) -> np.ndarray:
+        """First observations, shape (num_envs, n); seeds are those of `seed`."""
+        if any(self._options):
+            raise InputError("set_options is not supported; give patient, load and reference as settings.")
+        seeds = [s for s in self._seeds if s is not None]
+        found, _ = self.worlds.reset(seed=seeds if len(seeds) == self.num_envs else None)
+        self._reset_seeds()
+        self._reset_options()
+        return found
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Remember the actions."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """A control period of every world."""
+        assert self._actions is not None
+        observations, rewards, terminated, truncated, told = self.worlds.step(self._actions)
+        over = terminated | truncated
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for i in np.flatnonzero(over):
+            final = {name: told["final_info"][name][i] for name in ("time", "effort", "solver_failed")}
+            infos[i] = final | {
+                "terminal_observation": told["final_obs"][i],
+                "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
+            }
+        return observations, rewards.astype(np.float32), over, infos
+
+    def close(self) -> None:
+        """End the threads."""
+        self.worlds.close()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """A picture of each world."""
+        return self.worlds.render() or []
+
+    def get_attr(self, attr_name: str, indices: None | int | Iterable[int] = None) -> list[Any]:
+        """An attribute of some worlds."""
+        return [getattr(self.worlds.envs[i], attr_name) for i in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: None | int | Iterable[int] = None) -> None:
+        """Set an attribute of some worlds."""
+        for i in self._get_indices(indices):
+            setattr(self.worlds.envs[i], attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: None | int | Iterable[int] = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of some worlds."""
+        return [
+            getattr(self.worlds.envs[i], method_name)(*method_args, **method_kwargs) for i in self._get_indices(indices)
+        ]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: None | int | Iterable[int] = None) -> list[bool]:
+        """Worlds have no wrappers."""
+        return [False for _ in self._get_indices(indices)]

@@ -1,0 +1,1 @@
+"""Who is assisted: fields and populations, the motor command, effort, fatigue and slacking."""

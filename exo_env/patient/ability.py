@@ -1,0 +1,109 @@
+"""What the exercise needs, and what of it a patient cannot give: the measure of help that is needed.
+
+    ability = M_voluntary / M_hold, from 0 to 1, both about the elbow at 60 deg, the middle of the exercise
+
+M_hold holds arm and weight at rest. M_voluntary is what the muscles give at rest with all flexors driven as far as the
+patient can: maximum activation, less what is fatigued at the start, and the extensors with the share that co-contracts.
+A patient of ability 0.2 or more counts as one who can do something (assumed, and fixed before any policy was trained).
+
+What is lacking along the reference, with the moment M_need of arm and weight (motor_command.py, with the real weight)
+and the moment M_own that holds the lower link of the device, which is no help to carry:
+
+    M_lack = (1 - ability) max(M_need, 0) + M_own
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dms_core.model.geometry.rotations import dot, vec
+from dms_core.model.muscles.activation import MINIMUM
+from exo_env.ecosystem.exoskeleton import Exoskeleton, link_moment
+from exo_env.jit import compiled
+from exo_env.patient.effort import SIGN, N
+from exo_env.patient.motor_command import InternalModel
+from exo_env.patient.patient import PATIENT, Patient
+from exo_env.patient.static_optimisation import muscle_moment, needed_moment
+
+MIDDLE = math.radians(60.0)
+"""Angle of the ability [rad]."""
+ABLE = 0.2
+"""Ability from which a patient can do something [-]."""
+SMALLEST_SCALE = 1.0
+"""Of the need, where a movement hardly needs anything [Nm]."""
+
+
+@compiled
+def voluntary(patient, arm, angle):
+    """Largest static elbow moment that a patient (numbers as PATIENT) can want at an angle [rad] [Nm]."""
+    rested = 1.0 - patient[PATIENT.fatigued_at_start]
+    flexors, extensors = patient[PATIENT.maximum_activation_flexors], patient[PATIENT.maximum_activation_extensors]
+    against, given = min(patient[PATIENT.co_contraction] * flexors, extensors * rested), np.empty(N)
+    for i in range(N):
+        given[i] = max(flexors * rested if SIGN[i] > 0.0 else against, MINIMUM)
+    return muscle_moment(arm, angle, given)
+
+
+@compiled
+def able(patient, arm, load):
+    """Share of arm and load that a patient can hold [-]; tables as in command_kernel.py."""
+    hold = needed_moment(arm, load, MIDDLE, 0.0, 0.0)
+    return min(max(voluntary(patient, arm, MIDDLE) / hold, 0.0), 1.0) if hold > 0.0 else 1.0
+
+
+@compiled
+def put_lacking(patient, arm, load, link, course, lacking):
+    """Fill M_lack [Nm] along a course; gives ability and scale of `Need`."""
+    ability, total, gravity = able(patient, arm, load), 0.0, vec(load.gravity, 0)
+    g = math.sqrt(dot(gravity, gravity))
+    for k in range(course.shape[0]):
+        needed = max(needed_moment(arm, load, course[k, 0], course[k, 1], course[k, 2]), 0.0)
+        total += needed
+        lacking[k] = (1.0 - ability) * needed + link_moment(link, course[k, 0], g)
+    return ability, max(total / course.shape[0], SMALLEST_SCALE)
+
+
+def voluntary_moment(patient: Patient, known: InternalModel, angle: float = MIDDLE) -> float:
+    """Largest static elbow moment that the patient can want [Nm]."""
+    return voluntary(patient.numbers(), known.arm, angle)
+
+
+def ability(patient: Patient, known: InternalModel) -> float:
+    """What the patient can hold of arm and load, from 0 to 1 [-].
+
+    Args:
+        patient: who.
+        known: arm, machine and real weight.
+    """
+    return able(patient.numbers(), known.arm, known.load)
+
+
+@dataclass(frozen=True)
+class Need:
+    """Of one episode."""
+
+    ability: float
+    """Of the patient with this load [-]."""
+    lacking: np.ndarray
+    """M_lack at each control time [Nm], shape (n,)."""
+    scale: float
+    """Mean of M_need over the episode, at least 1 Nm [Nm]."""
+
+    @classmethod
+    def of(cls, patient: Patient, known: InternalModel, device: Exoskeleton, course: np.ndarray) -> Need:
+        """What a movement needs.
+
+        Args:
+            patient: who.
+            known: arm, machine and real weight.
+            device: whose lower link is carried.
+            course: psi [rad], its rate and its acceleration at the control times, shape (n, 3).
+        """
+        lacking = np.zeros(len(course))
+        found, scale = put_lacking(
+            patient.numbers(), known.arm, known.load, device.lower_link.numbers(), np.ascontiguousarray(course), lacking
+        )
+        return cls(found, lacking, scale)

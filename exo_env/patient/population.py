@@ -1,0 +1,225 @@
+"""Populations of patients: a distribution for each field of `Patient`, or a mixture of other populations.
+
+    title: after stroke, mildly affected
+    fields:
+      maximum_activation_flexors: {uniform: [0.5, 0.9]}
+      ...
+
+    title: everybody
+    mixture: {healthy: 1, stroke_mild: 3}
+
+A population with `fields` gives every field of a patient, so that nothing is left to a default unseen, unless it names
+another as `base` that gives the rest. `body_mass_index` [kg/m^2] may stand in place of body_mass: heavy and tall go
+together. Otherwise fields are independent (assumed); what goes together is put into populations of its own, and mixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dms_core.config_files import configs
+from dms_core.errors import InputError, choices
+from dms_core.yaml_text import read_yaml
+from exo_env.patient.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
+from exo_env.patient.patient import FIELDS, SEXES, Patient
+from exo_env.settings import Settings
+
+FOLDER = "patients"
+BODY_MASS_INDEX = "body_mass_index"
+
+
+class Population(Settings):
+    """Patients to draw from. JSON-able; checked in full when it is made."""
+
+    title: str = Field(default="", description="shown in tables and figures")
+    base: str | None = Field(default=None, description="shipped population that gives the fields not given here")
+    fields: dict[str, Any] = Field(default={}, description="distribution of each field, see distributions.py")
+    mixture: dict[str, float] = Field(default={}, description="weight of each of several shipped populations")
+
+    @model_validator(mode="after")
+    def _possible(self):
+        if bool(self.mixture) == bool(self.fields or self.base):
+            raise ValueError("either fields (with or without a base) or a mixture is wanted")
+        if self.mixture:
+            if min(self.mixture.values()) < 0.0 or sum(self.mixture.values()) <= 0.0:
+                raise ValueError(f"mixture = {self.mixture}: weights from 0, not all 0, are wanted")
+            _ = self.parts
+        else:
+            self._check_fields()
+        return self
+
+    @classmethod
+    def shipped(cls, name: str) -> Self:
+        """A population of configs/patients.
+
+        Raises:
+            InputError: there is none of this name; lists those there are.
+        """
+        if name not in shipped_populations():
+            raise InputError(
+                f"unknown population '{name}'. Shipped are: {choices(shipped_populations())}; or give a YAML file."
+            )
+        return cls.read(configs() / FOLDER / f"{name}.yaml")
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """A population from a YAML file.
+
+        Raises:
+            InputError: the file is missing or wrong; names file, key and value.
+        """
+        try:
+            return cls(**read_yaml(path))
+        except InputError as error:
+            raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+
+    @cached_property
+    def parts(self) -> tuple[Population, ...]:
+        """The mixed populations."""
+        return tuple(Population.shipped(name) for name in self.mixture)
+
+    @cached_property
+    def distributions(self) -> dict[str, Distribution]:
+        """Of each field, in the order in which `Patient` declares them, whatever the order in the file."""
+        given, order = self.fields_in_full, list(Patient.model_fields)
+        # A body mass index needs the height, which is declared after the body mass.
+        names = sorted(given, key=lambda k: (_patient_field(k) == "body_mass", order.index(_patient_field(k))))
+        return {name: _distribution(name, given[name]) for name in names}
+
+    @property
+    def fields_in_full(self) -> dict[str, Any]:
+        """Distributions as they stand in the files, those of the base included."""
+        if self.base is None:
+            return self.fields
+        under, here = Population.shipped(self.base), {_patient_field(name) for name in self.fields}
+        if under.mixture:
+            raise InputError(f"base = '{self.base}' is a mixture; a population with fields is wanted.")
+        return {k: v for k, v in under.fields_in_full.items() if _patient_field(k) not in here} | self.fields
+
+    def sample(self, generator: np.random.Generator) -> Patient:
+        """A patient. Draws one number for the choice of each mixture and one for each field."""
+        return Patient.of_row(self.draw(generator))
+
+    def draw(self, generator: np.random.Generator) -> np.ndarray:
+        """As `sample`, a patient as `Patient.row` gives it; what is checked of a population holds for all of these."""
+        if self.mixture:
+            chosen = weighted(self._weights, generator.random())
+            return self.parts[chosen].draw(generator)
+        draws, places = self._draws
+        row = np.empty(len(FIELDS))
+        row[places] = draws.sample(generator)
+        if BODY_MASS_INDEX in self.distributions:
+            row[FIELDS.index("body_mass")] *= row[FIELDS.index("height")] ** 2
+        return row
+
+    @cached_property
+    def _weights(self) -> tuple[float, ...]:
+        return tuple(self.mixture.values())
+
+    @cached_property
+    def _draws(self) -> tuple[Draws, np.ndarray]:
+        """Distributions as numbers, and the place of each in a patient's row."""
+        places = [FIELDS.index(_patient_field(name)) for name in self.distributions]
+        return Draws([_numeric(d) for d in self.distributions.values()]), np.array(places)
+
+    def _check_fields(self) -> None:
+        """Every field given once, and possible at the ends of its distribution.
+
+        Raises:
+            InputError: names key and value.
+        """
+        known = [*Patient.model_fields, BODY_MASS_INDEX]
+        for name in self.fields:
+            if name not in known:
+                raise InputError(f"fields: unknown key '{name}'. Allowed: {choices(known)}.")
+        if {BODY_MASS_INDEX, "body_mass"} <= self.fields.keys():
+            raise InputError(f"fields: body_mass and {BODY_MASS_INDEX} are both given; one of them is wanted.")
+        found = self.distributions
+        missing = [name for name in Patient.model_fields if name not in map(_patient_field, found)]
+        if missing:
+            raise InputError(f"fields: missing {', '.join(missing)}; give a distribution of each, or a base.")
+        for name, d in found.items():
+            for value in d.limits():
+                if name != BODY_MASS_INDEX:
+                    _checked(name, value, {name: value})
+        if BODY_MASS_INDEX in found:
+            for end in (0, -1):
+                value = found[BODY_MASS_INDEX].limits()[end]
+                ends = {BODY_MASS_INDEX: value, "height": found["height"].limits()[end]}
+                _checked(BODY_MASS_INDEX, value, ends)
+
+
+Source = str | Mapping[str, Any] | Patient | Population
+
+
+def population(source: Source) -> Population:
+    """Whom to draw from: a shipped population by name, a YAML file, a population or patient, or either as a dict.
+
+    A single patient is a population of which every draw is that patient.
+
+    Raises:
+        InputError: it is none of these; names the culprit and lists the shipped populations.
+    """
+    if isinstance(source, Population):
+        return source
+    if isinstance(source, Patient):
+        return Population(title="one patient", fields=source.model_dump())
+    if isinstance(source, str):
+        return Population.read(source) if source.endswith((".yaml", ".yml")) else Population.shipped(source)
+    if isinstance(source, Mapping):
+        if source.keys() & Population.model_fields.keys():
+            return Population(**source)
+        return population(Patient(**source))
+    raise InputError(
+        f"patient = {source!r}; a population ({choices(shipped_populations())}), a YAML file, or a mapping of the "
+        "fields of a patient is wanted."
+    )
+
+
+def shipped_populations() -> tuple[str, ...]:
+    """Names of the populations in configs/patients."""
+    return tuple(sorted(p.stem for p in (configs() / FOLDER).glob("*.yaml")))
+
+
+def _patient_field(name: str) -> str:
+    """Field of a patient that a key of a file decides."""
+    return "body_mass" if name == BODY_MASS_INDEX else name
+
+
+def _distribution(name: str, spec: Any) -> Distribution:
+    """A field's distribution, with the field's name in every complaint."""
+    try:
+        return distribution(spec)
+    except InputError as error:
+        raise InputError(f"fields: {name}: {error}") from None
+
+
+def _numeric(d: Distribution) -> Distribution:
+    """The same with places in SEXES instead of words."""
+    if isinstance(d, Constant) and isinstance(d.constant, str):
+        return Constant(constant=SEXES.index(d.constant))
+    if isinstance(d, Choice):
+        return d.changed(choice=tuple(SEXES.index(x) if isinstance(x, str) else x for x in d.choice))
+    return d
+
+
+def _patient(values: dict[str, Any]) -> Patient:
+    """A patient; a body mass index becomes the body mass."""
+    values = dict(values)
+    if BODY_MASS_INDEX in values:
+        values["body_mass"] = values.pop(BODY_MASS_INDEX) * values["height"] ** 2
+    return Patient(**values)
+
+
+def _checked(name: str, value: Any, fields: dict[str, Any]) -> None:
+    """Refuses a value that no patient can have."""
+    try:
+        _patient(fields)
+    except (InputError, TypeError) as error:
+        raise InputError(f"fields: {name} reaches {value!r}: {error}") from None

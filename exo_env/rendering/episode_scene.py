@@ -1,0 +1,97 @@
+"""The scene of an episode: points of the simulated system in the plane of motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dms_core.model.geometry.frames import rotation_matrix
+from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
+from exo_env.ecosystem.gym_machine import HANDLE, WEIGHT
+from exo_env.rendering.scene import MusclePath, RopePath, Scene
+from exo_env.world.control_period import READING
+from exo_env.world.episode import Episode
+from exo_env.world.readout import Readout
+
+UPPER_END = 0.22
+"""Drawn length of the upper link [m]."""
+
+
+def staged(now: Readout, label: str) -> Scene:
+    """The present scene.
+
+    Args:
+        now: readings of the episode that is shown.
+        label: names the patient.
+    """
+    episode, angle, hinge = now.episode, now.angle, now[READING.hinge]
+    arm, machine = episode.arm, episode.ecosystem.machine
+    assert machine is not None
+    grip = arm.elbow + arm.rotation(angle) @ arm.grip
+    index, q = episode.model.layout.index, episode.world.state.q
+    turn = rotation_matrix(np.array([q[index[f"{HANDLE}.p{i}"]] for i in range(4)]))
+    tied = grip + turn @ (0.0, -machine.handle.length, 0.0)
+    weight = np.array([q[index[f"{WEIGHT}.{x}"]] for x in "xyz"])
+    low, high = np.array(machine.low_pulley), np.array(machine.high_pulley)
+    return Scene(
+        shoulder=arm.segments["humerus"].origin[:2].copy(),
+        elbow=arm.elbow[:2].copy(),
+        grip=grip[:2],
+        muscles=_muscles(episode, angle, now.activations),
+        ropes=_ropes(episode, hinge, now.tensions),
+        exo_links=_links(episode, hinge),
+        elbow_angle=angle,
+        reference_angle=now.reference,
+        time=episode.world.time,
+        error_deg=math.degrees(now.error),
+        muscle_moment=now[READING.muscle_moment],
+        device_moment=now[READING.exo_moment],
+        effort=episode.effort,
+        label=label,
+        weight=weight[:2],
+        weight_mass=episode.ecosystem.weight,
+        pulleys=(low[:2], high[:2]),
+        gym_rope=np.array([grip, tied, low, high, weight])[:, :2],
+    )
+
+
+def _muscles(episode: Episode, angle: float, activations: np.ndarray) -> tuple[MusclePath, ...]:
+    """Paths of the muscles with their activations."""
+    arm, A, found = episode.arm, episode.arm.rotation(angle), []
+    for m, a in zip(MUSCLES, activations, strict=True):
+        path = arm.path(m, welded=True)
+        points = [arm.elbow + A @ np.array(p.point) if p.body == "forearm" else np.array(p.point) for p in path]
+        found.append((np.array(points)[:, :2], float(a)))
+    return tuple(found)
+
+
+def _ropes(episode: Episode, hinge: float, tensions: np.ndarray) -> tuple[RopePath, ...]:
+    """Paths of the ropes with their tensions."""
+    worn, found = episode.worn, []
+    for name, tension in zip((AGONIST, ANTAGONIST), tensions, strict=True):
+        rope = getattr(worn.device, name)
+        ends = np.array([_on_upper(episode, rope.upper), _on_lower(episode, hinge, rope.lower)])
+        found.append((ends[:, :2], float(tension)))
+    return tuple(found)
+
+
+def _links(episode: Episode, hinge: float) -> tuple[np.ndarray, np.ndarray]:
+    """Upper link from its far end to the hinge, lower link from the hinge to the guide."""
+    upper = [_on_upper(episode, (0.0, y, 0.0)) for y in (UPPER_END, 0.0)]
+    lower = [_on_lower(episode, hinge, (0.0, -y, 0.0)) for y in (0.0, episode.worn.device.guide_distance)]
+    return np.array(upper)[:, :2], np.array(lower)[:, :2]
+
+
+def _on_upper(episode: Episode, point: tuple[float, float, float]) -> np.ndarray:
+    """A point of the upper link in ground axes [m]."""
+    worn = episode.worn
+    return worn.origin + rotation_matrix(worn.orientation) @ point
+
+
+def _on_lower(episode: Episode, hinge: float, point: tuple[float, float, float]) -> np.ndarray:
+    """A point of the lower link in ground axes [m]."""
+    x, y, z = point
+    c, s = math.cos(hinge), math.sin(hinge)
+    return _on_upper(episode, (c * x - s * y, s * x + c * y, z))

@@ -1,0 +1,173 @@
+"""Training configurations: rl_zoo3's format, nothing evaluated, every mistake named."""
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+import yaml
+
+from agents.training.config import ENVIRONMENT_ID, Config
+from agents.training.rl_zoo_text import read_call, write_call
+from dms_core.config_files import configs
+from dms_core.errors import InputError
+from tests.agents.tiny import config_file, content
+
+SHIPPED = sorted((configs() / "agents").rglob("*.yml"))
+
+
+def refused(said, algorithm="ppo", overrides=(), **changes):
+    pytest.importorskip("stable_baselines3")
+    from agents.training.algorithms import arguments
+
+    with pytest.raises(InputError) as caught:
+        arguments(Config.of(content(algorithm, **changes), algorithm, overrides))
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
+def test_shipped_files_are_accepted(path):
+    pytest.importorskip("sb3_contrib")
+    from agents.commands.train import check_environment
+    from agents.training.algorithms import arguments
+
+    config = Config.read(path)
+    assert config.training.algorithm == path.stem
+    assert set(config.arguments) == set(arguments(config))
+    check_environment(config.env_kwargs)
+
+
+def test_there_is_a_file_for_every_algorithm():
+    pytest.importorskip("sb3_contrib")
+    from agents.training.algorithms import ALGORITHMS
+
+    assert {p.stem for p in SHIPPED} == set(ALGORITHMS)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
+def test_rl_zoo3_reads_the_same_values(path):
+    # rl_zoo3 reads by PyYAML, in which 1e-4 is text; the environment's section has to be the same for both readers.
+    section = yaml.safe_load(path.read_text())[ENVIRONMENT_ID]
+    for key in ("policy_kwargs", "normalize"):
+        if isinstance(section.get(key), str):
+            section[key] = read_call(section[key])
+    assert section == Config.read(path).section
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
+def test_rl_zoo3_takes_them(path, tmp_path):
+    zoo = pytest.importorskip("rl_zoo3.exp_manager")
+    import exo_env  # noqa: F401
+
+    name = {"recurrent_ppo": "ppo_lstm"}.get(path.stem, path.stem)
+    manager = zoo.ExperimentManager(
+        Namespace(), name, ENVIRONMENT_ID, str(tmp_path), config=str(path), verbose=0, device="cpu"
+    )
+    model, _ = manager.setup_experiment()
+    assert model.get_env().num_envs == Config.read(path).n_envs
+    assert model.get_vec_normalize_env() is not None
+    model.get_env().close()
+
+
+def test_what_is_kept_of_a_run_is_read_back(tmp_path):
+    first = Config.read(config_file(tmp_path), ["policy_kwargs.net_arch=[4]", "training.eval_every=7", "gamma=9.5e-1"])
+    path = tmp_path / "kept.yml"
+    path.write_text(yaml.safe_dump(first.content()))
+    again = Config.read(path)
+    assert again.content() == first.content()
+    assert again.arguments["policy_kwargs"] == {"net_arch": [4], "activation_fn": "nn.Tanh"}
+    assert again.training.eval_every == 7 and again.training.algorithm == "ppo" and again.normalize == {"gamma": 0.95}
+
+
+def test_text_of_mappings_goes_there_and_back():
+    text = "dict(net_arch=dict(pi=[64, 64], vf=[32]), activation_fn=th.nn.ReLU, log_std_init=-2, ortho_init=False)"
+    found = read_call(text)
+    assert found["net_arch"] == {"pi": [64, 64], "vf": [32]} and found["log_std_init"] == -2
+    assert read_call(write_call(found)) == found
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["__import__('os').system('true')", "dict(a=open('x'))", "dict(a=[x for x in (1,)])", "dict(**{'a': 1})", "[1, 2]",
+     "dict(a=(lambda: 1)())", "dict(a=1).values()", "dict(", "{1: 2}", "dict(a=f'{1}')"],
+)  # fmt: skip
+def test_code_is_never_run(text):
+    with pytest.raises(InputError, match="dict\\(key=value"):
+        read_call(text)
+
+
+@pytest.mark.parametrize(
+    "said, changes",
+    [
+        ("ppo: unknown key 'learning_rat'. Allowed: batch_size", {"learning_rat": 1e-3}),
+        ("ppo: n_steps = 1.5; a whole number is wanted", {"n_steps": 1.5}),
+        ("ppo: gamma = True; a number is wanted", {"gamma": True}),
+        ("ppo: learning_rate = 'slow'; a number or text like lin_3e-4 is wanted", {"learning_rate": "slow"}),
+        ("ppo: clip_range = 'lin_-1'", {"clip_range": "lin_-1"}),
+        ("ppo: policy_kwargs: unknown key 'width'", {"policy_kwargs": "dict(width=3)"}),
+        ("ppo: policy_kwargs: net_arch = 'big'; a list of a whole number", {"policy_kwargs": {"net_arch": "big"}}),
+        ("activation_fn = 'os.system'; one of elu", {"policy_kwargs": "dict(activation_fn=os.system)"}),
+        ("policy = 'CnnPolicy'; ppo takes MlpPolicy", {"policy": "CnnPolicy"}),
+        ("n_envs = 0; a whole number from 1", {"n_envs": 0}),
+        ("n_timesteps = '1e6'", {"n_timesteps": "1e6"}),
+        ("normalize: unknown key 'norm'", {"normalize": {"norm": True}}),
+        ("normalize: clip_obs = -1; a positive number", {"normalize": {"clip_obs": -1}}),
+        ("env_kwargs = 3; a mapping", {"env_kwargs": 3}),
+        ("ppo: unknown key 'env_wrapper'", {"env_wrapper": "a.b"}),
+        ("ppo: gamma = 1.5; a number from 0 to 1 is wanted", {"gamma": 1.5}),
+        ("ppo: gae_lambda = -0.1; a number from 0 to 1 is wanted", {"gae_lambda": -0.1}),
+        ("ppo: gamma = nan; a number from 0 to 1", {"gamma": float("nan")}),
+        ("ppo: learning_rate = -1; a positive number is wanted", {"learning_rate": -1}),
+        ("ppo: learning_rate = 'lin_0.0'; a positive number is wanted", {"learning_rate": "lin_0.0"}),
+        ("ppo: learning_rate = 'lin_1.2.3'; a number or text like lin_3e-4", {"learning_rate": "lin_1.2.3"}),
+        ("ppo: clip_range = 0; a positive number is wanted", {"clip_range": 0}),
+    ],
+)
+def test_mistakes_are_named(said, changes):
+    refused(said, **changes)
+
+
+@pytest.mark.parametrize(
+    "key", ["n_timesteps", "n_envs", "env_kwargs", "normalize", "policy", "frame_stack", "n_steps"]
+)
+def test_every_key_is_among_those_allowed(key):
+    refused(f" {key},", overrides=["n_timestep=3"])
+
+
+@pytest.mark.parametrize("gamma", [0, 0.0, 1, 1.0])
+def test_ends_of_a_range_belong_to_it(gamma):
+    pytest.importorskip("stable_baselines3")
+    from agents.training.algorithms import arguments
+
+    assert arguments(Config.of(content(gamma=gamma), "ppo"))["gamma"] == gamma
+
+
+@pytest.mark.parametrize(
+    "said, override",
+    [
+        ("--set n_steps: key=value is wanted", "n_steps"),
+        ("--set n_steps.a=1: 'n_steps' is not a mapping", "n_steps.a=1"),
+        ("value '[1' is not valid YAML", "n_steps=[1"),
+        ("unknown key 'eval'", "training.eval=1"),
+        ("unknown algorithm 'dqn'. There are: ppo, recurrent_ppo, sac, tqc", "training.algorithm=dqn"),
+    ],
+)
+def test_mistakes_of_overrides_are_named(said, override):
+    refused(said, overrides=[override])
+
+
+def test_another_environment_is_refused(tmp_path):
+    path = tmp_path / "ppo.yml"
+    path.write_text("exo/ElbowLift-v7: {n_timesteps: 10}\n")
+    with pytest.raises(
+        InputError, match="ppo.yml: the configuration is for exo/ElbowLift-v7; here there is exo/ElbowL"
+    ):
+        Config.read(path)
+
+
+def test_nothing_heavy_is_imported_by_the_command_line():
+    import subprocess
+
+    code = "import sys, agents.__main__; print([m for m in ('torch', 'ray', 'matplotlib', 'onnx') if m in sys.modules])"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[3])
+    assert said.stdout.strip() == "[]", said.stderr

@@ -1,0 +1,292 @@
+"""The assembled system against differences of its own residual, and what assembly finds out about a mechanism."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from dms_core.assembly.model import Model
+from dms_core.assembly.residual import evaluate_inputs, evaluate_newton, evaluate_rates, evaluate_residual
+from dms_core.assembly.sensing import SENSING
+from dms_core.assembly.sparsity import newton_pattern, rate_pattern
+from dms_core.compiled.arena import Packed, inner
+from dms_core.errors import AssemblyError, ModelError
+from dms_core.linear.rank import minimum_norm, minimum_norms
+from dms_core.model import Distance, Fixed, Gravity, PointMass, Revolute, RigidBody, Spherical, System
+from dms_core.model.geometry.frames import quaternion
+from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate
+from dms_core.simulation.initial_rates import consistent_rates
+from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.newton import apply, right_hand_side, set_rates
+from dms_core.simulation.state import MODEL, STATE
+from tests.dms_core.assembly.specimen import BODIES, CONSTRAINTS, FORCES, random_point, scales, specimen
+from tests.dms_core.test_derivatives import CONCRETE, differences
+
+NOT_IN_A_SYSTEM_OF_RIGID_PARTS: set[str] = {"delayed_error"}
+"""Kinds that need companions of their own; their kernels stand in test_derivatives."""
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return specimen()
+
+
+class Stage:
+    """One stage of the method at a random state with mu = 0: residual, matrix, linear solve."""
+
+    def __init__(self, model: Model, c0: float, seed: int) -> None:
+        self.model, self.c0 = model, c0
+        self.simulation = Simulation(model)
+        self.m, self.s = model.tables.table, self.simulation._world.table
+        state, x, rng = self.simulation.state, random_point(model, seed), np.random.default_rng(seed)
+        n, w = model.n_q, state.w
+        evaluate_inputs(inner(self.s, STATE.signals), 0.3, False, inner(self.s, STATE.w))
+        w.q[:n], w.v[:n], w.lam[:] = x.q, x.v, x.lam
+        # The stage's constants such that qdot = v and vdot = a, up to something.
+        state.cq[:] = x.v - c0 * x.q + rng.normal(size=n)
+        state.cv[:] = x.a - c0 * x.v
+        set_rates(self.s, c0)
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """Scaled residual (r1 / c0, r2 / c0^2, r3, r4 / c0) at the present state plus the scaled correction x."""
+        apply(self.m, self.s, self.c0, x, 1.0)
+        evaluate_residual(inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w))
+        right_hand_side(self.m, self.s, self.c0)
+        apply(self.m, self.s, self.c0, x, -1.0)
+        return -self.simulation.state.b
+
+    def matrix(self) -> np.ndarray:
+        """Dense scaled Newton matrix from its scatter maps."""
+        welds = self.model.welds
+        pattern, slots = newton_pattern(self.model.layout, welds.free, welds.solved)
+        packed, values = Packed(pattern), np.zeros(len(slots.number))
+        dynamics, constraints = inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints)
+        evaluate_newton(dynamics, constraints, packed.table, inner(self.s, STATE.w), self.c0, values)
+        rows, columns = slots.coordinates()
+        A = np.zeros((len(self.simulation.state.b),) * 2)
+        A[rows, columns] = values
+        return A
+
+    def solved(self, b: np.ndarray) -> np.ndarray:
+        """x of A x = b with the model's own LU."""
+        state, x = self.simulation.state, np.zeros(len(b))
+        evaluate_newton(
+            inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.m, MODEL.newton),
+            inner(self.s, STATE.w), self.c0, state.newton_values,
+        )  # fmt: skip
+        assert factorise(self.m, MODEL.newton_lu, state.newton_values, state.newton_work) > 1e-8
+        back_substitute(self.m, MODEL.newton_lu, state.newton_values, b, x, state.newton_work)
+        return x
+
+
+def _unknown_scales(model: Model, c0: float) -> np.ndarray:
+    """Sizes of the scaled unknowns (dq, dv / c0, dlam / c0^2, dmu / c0) over which the residual is smooth."""
+    by_q, by_v = scales(model)
+    free, k = model.welds.free, len(model.welds.solved)
+    return np.concatenate([by_q[free], by_v[free] / c0, np.full(k, 10.0 / c0**2), np.full(k, 1.0 / c0)])
+
+
+def test_the_specimen_has_every_kind():
+    kinds = {x.kind for x in (*BODIES, *CONSTRAINTS, *FORCES)} | {"euler_norm"}
+    wanted = {kind for kind, cls in CONCRETE.items() if not hasattr(cls, "outputs")}
+    assert wanted - kinds == NOT_IN_A_SYSTEM_OF_RIGID_PARTS
+
+
+@pytest.mark.parametrize("c0", [3.0, 1.5e3])
+@pytest.mark.parametrize("seed", range(2))
+def test_newton_matrix_is_the_derivative_of_the_residual(model, c0, seed):
+    """At c0 = 3 all blocks weigh alike, so that each one shows; at 1500 as in a run of a millisecond's steps."""
+    stage = Stage(model, c0, seed)
+    A, by = stage.matrix(), _unknown_scales(model, c0)
+    numeric, value = (
+        differences(stage.residual, np.zeros(len(A)), by),
+        np.abs(stage.residual(np.zeros(len(A))))[:, None],
+    )
+    # As in test_derivatives: rounding 1e-16 / 3e-5 of the residual, and the tendon's curvature 1e-6 of a derivative.
+    allowed = 1e-6 * np.abs(numeric).max(axis=0) + (1e-11 * value + 3e-11 * np.abs(A) @ by[:, None]) / by + 1e-12
+    wrong = np.argwhere(np.abs(A - numeric) > allowed)
+    names = [model.layout.names[k] for k in model.welds.free] * 2
+    names += [model.layout.row_names[k] for k in model.welds.solved] * 2
+    assert not len(wrong), [(names[i], names[j], A[i, j], numeric[i, j]) for i, j in wrong[:8]]
+
+
+@pytest.mark.parametrize("c0", [10.0, 1.5e3, 1e6])
+def test_the_models_own_lu_solves_with_that_matrix(model, c0):
+    """The scatter into the LU and the elimination order, chosen at another state and another c0."""
+    stage = Stage(model, c0, 1)
+    A, x = stage.matrix(), np.random.default_rng(2).normal(size=2 * len(model.welds.free) + 2 * len(model.welds.solved))
+    # A backward stable solve leaves 1e-15 of |A| |x|; pivots down to 1e-6 of their row cost the rest.
+    np.testing.assert_allclose(A @ stage.solved(A @ x), A @ x, atol=1e-8)
+
+
+def test_acceleration_matrix_is_the_derivative_of_its_equations(model):
+    stage = Stage(model, 10.0, 0)
+    w, free, solved = stage.simulation.state.w, model.welds.free, model.welds.solved
+    second = model.second_order[free]
+    pattern, slots = rate_pattern(model.layout, free, solved)
+    packed, values = Packed(pattern), np.zeros(len(slots.number))
+    start = np.concatenate([np.where(second, w.a[free], w.v[free]), w.lam[solved]])
+    v = w.v[free].copy()
+
+    def equations(x: np.ndarray) -> np.ndarray:
+        n = len(free)
+        w.a[free], w.v[free] = np.where(second, x[:n], 0.0), np.where(second, v, x[:n])
+        w.lam[solved] = x[n:]
+        dynamics, constraints = inner(stage.m, MODEL.dynamics), inner(stage.m, MODEL.constraints)
+        evaluate_rates(dynamics, constraints, packed.table, inner(stage.s, STATE.w), values)
+        return np.concatenate([w.r2[free], w.phi_a[solved]])
+
+    value = np.abs(equations(start)).max()
+    rows, columns = slots.coordinates()
+    A = np.zeros((len(start),) * 2)
+    A[rows, columns] = values
+    by = np.concatenate([scales(model)[1][free], np.full(len(solved), 10.0)])
+    numeric = differences(equations, start, by)
+    # Linear but for the force-velocity curve: rounding 1e-16 / 3e-5 of values near 1e3.
+    assert np.all(np.abs(A - numeric) <= 1e-6 * np.abs(numeric) + 1e-11 * value / by)
+
+
+def test_start_satisfies_every_equation(model):
+    """phi, phi_q v + phi_t, and with consistent rates r2 and phi_q a + ... = 0, at the assembled start."""
+    phi, phi_v, _, _ = model.constraint_jacobian(model.start.q, model.start.v)
+    assert np.abs(phi).max() < 1e-12
+    assert np.abs(phi_v).max() < 1e-12
+    simulation = Simulation(model)
+    m, s, w = model.tables.table, simulation._world.table, simulation.state.w
+    evaluate_inputs(inner(s, STATE.signals), 0.0, False, inner(s, STATE.w))
+    assert consistent_rates(m, s)
+    state = simulation.state
+    x = (state.q[None], state.v[None], state.vd[None], state.lam[None])
+    w.lam[:] = model.whole_multipliers(state.signals, np.zeros(1), *x, np.ones(1, bool))[0]
+    whole = model.sensing.table
+    evaluate_residual(inner(whole, SENSING.dynamics), inner(whole, SENSING.constraints), inner(s, STATE.w))
+    # Forces are near 1e3 N.
+    assert np.abs(w.r2[: model.n_q]).max() < 1e-9
+    trajectory = simulate(model, 0.01, SolverOptions(rtol=1e-8))
+    h = trajectory.t[1]
+    # A second look that knows nothing of the rates' equations: what the first step does.
+    second = model.second_order
+    assert np.all(np.abs(trajectory.v[1] - trajectory.v[0] - h * trajectory.a[0])[second] < 1e-2 * h)
+
+
+def _bar(name: str, length: float, at: tuple[float, float], angle: float) -> RigidBody:
+    return RigidBody(
+        name=name,
+        mass=1.0,
+        inertia=(0.001, 0.1, 0.1),
+        centre_of_mass=(length / 2, 0.0, 0.0),
+        position=(*at, 0.0),
+        orientation=tuple(quaternion((0, 0, 1), angle)),
+    )
+
+
+def _square(coupler: float = 1.0, **first) -> System:
+    """Crank, coupler and rocker of a parallelogram, all axes along z; the last joint closes the loop."""
+    crank = _bar("crank", 1.0, (0.0, 0.0), math.pi / 2)
+    return System(
+        "square",
+        bodies=[
+            crank.model_copy(update=first),
+            _bar("coupler", coupler, (0.0, 1.0), 0.0),
+            _bar("rocker", 1.0, (1.0, 0.0), math.pi / 2),
+        ],
+        constraints=[
+            Revolute(name="a", body_j="crank"),
+            Revolute(name="b", body_i="crank", body_j="coupler", point_i=(1.0, 0.0, 0.0), point_j=(0.0, 0.0, 0.0)),
+            Revolute(name="c", body_i="coupler", body_j="rocker", point_i=(coupler, 0.0, 0.0), point_j=(1.0, 0.0, 0.0)),
+            Revolute(name="d", body_j="rocker", point_i=(1.0, 0.0, 0.0), point_j=(0.0, 0.0, 0.0)),
+        ],
+        forces=[Gravity(name="gravity", acceleration=(5.0, -8.0, 0.0))],
+    )
+
+
+def test_redundant_rows_of_a_planar_loop_are_named():
+    model = Model(_square())
+    assert model.degrees_of_freedom == 1
+    assert len(model.redundant_rows) == 3
+    # What is redundant is out of the plane: z of a point, tilts of an axis. Rows declared earlier are kept.
+    assert all(row.split(".")[1] in ("z", "tilt_f", "tilt_g") for row in model.redundant_rows)
+    assert not any(row.startswith("a.") for row in model.redundant_rows)
+
+
+def test_a_loop_that_is_nearly_closed_is_closed():
+    model = Model(_square(coupler=1.2))
+    assert np.abs(model.constraint_jacobian(model.start.q)[0]).max() < 1e-12
+    assert 0.01 < model.start.moved < 0.5
+
+
+def test_a_loop_that_cannot_close_is_named_with_its_gap():
+    with pytest.raises(
+        AssemblyError, match=r"'square' cannot be assembled: constraint '[bcd]\.\w+' stays open by 0\.\d+"
+    ):
+        Model(_square(coupler=4.0))
+
+
+def test_inconsistent_velocities_are_named():
+    with pytest.raises(AssemblyError, match=r"velocities are inconsistent: constraint '\w\.\w+' would open at"):
+        Model(_square(angular_velocity=(0.0, 0.0, 2.0)))
+    with pytest.raises(AssemblyError, match=r"'rod.length' would open at"):
+        Model(
+            System(
+                bodies=[PointMass(name="bob", mass=1.0, position=(1.0, 0.0, 0.0), velocity=(0.5, 1.0, 0.0))],
+                constraints=[Distance(name="rod", body_j="bob")],
+            )
+        )
+
+
+def test_an_unknown_name_is_refused_with_the_right_ones():
+    with pytest.raises(ModelError, match="'bobb' does not exist. Declared: bob, ground"):
+        Model(
+            System(
+                bodies=[PointMass(name="bob", mass=1.0)], constraints=[Distance(name="rod", body_j="bobb", length=1.0)]
+            )
+        )
+
+
+def test_multipliers_of_redundant_constraints_are_those_of_least_norm():
+    """A table on four welds: each carries a quarter, and G^T lam is what holds the weight."""
+    legs = [(1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (-1.0, 0.0, 1.0), (-1.0, 0.0, -1.0)]
+    system = System(
+        "table",
+        bodies=[RigidBody(name="top", mass=8.0, inertia=(1.0, 1.0, 1.0))],
+        constraints=[Fixed(name=f"leg{k}", body_j="top", point_i=p) for k, p in enumerate(legs)],
+        forces=[Gravity(name="gravity", acceleration=(0.0, -10.0, 0.0))],
+    )
+    model = Model(system)
+    assert model.degrees_of_freedom == 0
+    assert len(model.redundant_rows) == 18
+    trajectory = simulate(model, 0.1)
+    lam = trajectory.lam[-1]
+    rows = [model.layout.constraint_rows(f"leg{k}") for k in range(4)]
+    # phi is ground minus body, so that lam is the force on the top: a quarter of the weight, to rounding.
+    np.testing.assert_allclose([lam[r][1] for r in rows], 4 * [20.0], atol=1e-10)
+    G = model.constraint_jacobian(trajectory.q[-1])[2]
+    shortest = np.linalg.lstsq(G.T, G.T @ lam, rcond=1e-10)[0]
+    np.testing.assert_allclose(lam, shortest, atol=1e-10)
+
+
+def test_multipliers_of_many_states_at_once_are_those_of_each():
+    """Ranks and sizes of rows mixed; against the singular value decomposition of one matrix."""
+    rng = np.random.default_rng(3)
+    G = np.stack([rng.normal(size=(9, r)) @ rng.normal(size=(r, 7)) * 10.0**k for k, r in enumerate((7, 5, 3, 1))])
+    lam = rng.normal(size=(4, 9))
+    for k, best in enumerate(minimum_norms(G, lam)):
+        np.testing.assert_allclose(best, minimum_norm(G[k], lam[k]), atol=1e-10)
+
+
+def test_redundant_rows_do_not_change_the_motion():
+    """The same square with balls in place of the hinges that close it: full rank, one freedom, equal motion."""
+    hinged, options = _square(), SolverOptions(rtol=1e-8)
+    free = [c for c in hinged.constraints if c.kind == "revolute"][:2]
+    balls = [
+        Spherical(name="c", body_i="coupler", body_j="rocker", point_i=(1.0, 0.0, 0.0), point_j=(1.0, 0.0, 0.0)),
+        Revolute(name="d", body_j="rocker", point_i=(1.0, 0.0, 0.0), point_j=(0.0, 0.0, 0.0)),
+    ]
+    model = Model(System("balls", bodies=hinged.bodies, constraints=[*free, *balls], forces=hinged.forces))
+    assert len(model.redundant_rows) == 1
+    one, other = (simulate(x, 0.5, options).at([0.25, 0.5]).q for x in (Model(hinged), model))
+    assert np.abs(one[1] - one[0]).max() > 0.1
+    # Both run to 1e-8 of the same motion.
+    np.testing.assert_allclose(one, other, atol=1e-6)

@@ -1,0 +1,139 @@
+"""What a user can do wrong, and the sentence that says so."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from dms_core.errors import InputError
+from exo_env.envs.elbow_lift import ElbowLiftEnv
+from exo_env.envs.vector_env import ElbowLiftVectorEnv
+
+
+@pytest.mark.parametrize(
+    ("action", "complaint"),
+    [
+        ([np.nan, 0.0], "finite numbers"),
+        ([np.inf, 0.0], "finite numbers"),
+        ([0.0], r"shape \(1,\)"),
+        ([[0.0, 0.0]], r"shape \(1, 2\)"),
+        (0.5, r"shape \(\)"),
+        ("up", "two numbers"),
+        (None, "finite|shape|two numbers"),
+    ],
+)
+def test_bad_actions(env, action, complaint):
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=complaint):
+        env.step(action)
+    # Nothing has happened: the episode goes on.
+    assert env.step(np.zeros(2))[4]["time"] == pytest.approx(0.02)
+
+
+def test_actions_outside_the_box_are_clipped(env):
+    env.reset(seed=0)
+    beyond = [env.step(np.array([0.3, -7.0]))[0] for _ in range(3)]
+    env.reset(seed=0)
+    inside = [env.step(np.array([0.3, -1.0]))[0] for _ in range(3)]
+    np.testing.assert_array_equal(beyond, inside)
+
+
+def test_step_before_reset_and_after_the_end():
+    env = ElbowLiftEnv(episode_duration=0.1)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        env.step(np.zeros(2))
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.readings()
+    env.reset(seed=0)
+    truncated = [env.step(np.array([-0.5, -1.0]))[3] for _ in range(5)]
+    assert truncated == [False] * 4 + [True]
+    with pytest.raises(gymnasium.error.ResetNeeded, match="over"):
+        env.step(np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"patient": "nobody"}, "unknown population 'nobody'.*healthy"),
+        ({"patient": {"strength": -1.0}}, "strength"),
+        ({"patient": 3}, "patient = 3"),
+        ({"load": -1.0}, "load = -1.0"),
+        ({"load": "heavy"}, "load = 'heavy'"),
+        ({"exoskeleton": "shoulder"}, "exoskeleton = 'shoulder'; .*elbow"),
+        ({"exoskeleton": {"mass": 1.0}}, "mass"),
+        ({"reference": {"amplitude_deg": 70.0}}, "at most 100"),
+        ({"reference": {"speed": 1.0}}, "speed"),
+        ({"action_mode": "torque"}, "action_mode = 'torque'; .*rope_tension"),
+        ({"drive_settings": {"setpoint_range": 0.1}}, "setpoint_range"),
+        ({"observation": []}, "observation"),
+        ({"observation": ["device", "device"]}, "different groups"),
+        ({"observation": ["eeg"]}, "group 'eeg' is unknown; there are device, emg, privileged"),
+        ({"noise": {"emg": {"deviation": 0.1}}}, "channel 'emg' is not observed"),
+        ({"noise": {"angle": {"deviation": -0.1}}}, "deviation"),
+        ({"noise": "some"}, "noise = 'some'"),
+        ({"reward_weights": {"beauty": 1.0}}, "beauty"),
+        ({"limits": {"lowest_deg": 80.0, "highest_deg": 70.0}}, "lowest_deg = 80.0 must be below"),
+        ({"control_rate": 0.0}, "control_rate = 0.0"),
+        ({"control_rate": "fast"}, "control_rate = 'fast'"),
+        ({"episode_duration": float("nan")}, "episode_duration = nan"),
+        ({"repetitions": 0}, "repetitions = 0; a whole number from 1 to 20"),
+        ({"repetitions": 21}, "repetitions = 21"),
+        ({"repetitions": 2.0}, "repetitions = 2.0"),
+        ({"repetitions": True}, "repetitions = True"),
+        ({"reference": {"count": 2}}, "count"),
+        ({"rtol": 1.0}, "rtol = 1.0"),
+        ({"wings": 2}, "setting 'wings' is unknown; there are action_mode, control_rate"),
+        ({"render_mode": "ascii"}, "render_mode = 'ascii'; .*rgb_array"),
+    ],
+)
+def test_bad_settings(settings, complaint):
+    with pytest.raises(InputError, match=complaint):
+        ElbowLiftEnv(**settings)
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"weight": 1.0}, "option 'weight' is unknown; there are initial_angle_deg, load, patient, reference"),
+        ({"load": 0.0}, "load = 0.0"),
+        ({"patient": "nobody"}, "nobody"),
+        ({"initial_angle_deg": 170.0}, "initial_angle_deg = 170.0"),
+        ({"initial_angle_deg": "low"}, "initial_angle_deg = 'low'"),
+        ({"reference": {"start_deg": 5.0}}, "start_deg"),
+    ],
+)
+def test_bad_options(env, options, complaint):
+    with pytest.raises(InputError, match=complaint):
+        env.reset(options=options)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros(2))
+
+
+def test_a_population_file_with_a_wrong_value(tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text("base: healthy\nfields:\n  strength: {uniform: [0.5, 99.0]}\n")
+    with pytest.raises(InputError, match="wrong.yaml.*strength"):
+        ElbowLiftEnv(patient=str(path))
+
+
+def test_a_first_reset_that_is_refused_leaves_the_made_environment_usable():
+    env = gymnasium.make("exo_env:exo/ElbowLift-v0")
+    with pytest.raises(InputError, match="foo"):
+        env.reset(seed=0, options={"foo": 1})
+    env.reset(seed=0)
+    assert np.isfinite(env.step(np.zeros(2, np.float32))[0]).all()
+    env.close()
+
+
+@pytest.mark.parametrize("options", [3, [{"load": 1.0}], "load"])
+def test_options_that_are_no_mapping_are_refused(options):
+    env, batch = ElbowLiftEnv(), ElbowLiftVectorEnv(2)
+    for world in (env, batch):
+        with pytest.raises(InputError, match="options = .* mapping"):
+            world.reset(seed=0, options=options)
+    batch.close()
+
+
+def test_a_load_that_is_no_number_is_refused_in_a_line():
+    with pytest.raises(InputError, match=r"load = nan: a number from 0.05 to 50.0 kg") as caught:
+        ElbowLiftEnv(load=float("nan"))
+    assert "\n" not in str(caught.value)

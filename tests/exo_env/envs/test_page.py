@@ -1,0 +1,83 @@
+"""The environment page (the class docstring) against the spaces, the weights and the constructor."""
+
+import inspect
+import re
+
+import pytest
+
+from exo_env.drives.drive import PidSetpoint, RopeTension
+from exo_env.envs.elbow_lift import ElbowLiftEnv
+from exo_env.tasks.rewards import Weights
+
+PAGE = inspect.getdoc(ElbowLiftEnv)
+
+
+def _tables(section):
+    """Tables of a section as lists of rows, the heading left out."""
+    text = PAGE.split(f"## {section}\n")[1].split("\n## ")[0]
+    found = []
+    for block in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
+        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.strip().splitlines()]
+        found.append(rows[2:])
+    return found
+
+
+def test_it_has_the_sections_of_the_template():
+    wanted = ["Description", "Action Space", "Observation Space", "Rewards", "Starting State", "Episode End",
+              "Arguments", "Version History"]  # fmt: skip
+    assert re.findall(r"^## (.*)$", PAGE, re.MULTILINE) == wanted
+
+
+@pytest.mark.parametrize(
+    ("table", "mode", "drive"), [(0, "rope_tension", RopeTension()), (1, "pid_setpoint", PidSetpoint())]
+)
+def test_actions(table, mode, drive):
+    env, rows = ElbowLiftEnv(action_mode=mode), _tables("Action Space")[table]
+    assert [row[1] for row in rows] == list(drive.names)
+    offset, gain, _ = drive.table(0.02).T
+    low, high = offset - gain, offset + gain
+    for k, (_, _, least, most, control_least, control_most, _) in enumerate(rows):
+        assert (env.action_space.low[k], env.action_space.high[k]) == (float(least), float(most))
+        assert (low[k], high[k]) == (float(control_least), float(control_most))
+
+
+def test_numbers_in_the_text_are_those_of_the_settings():
+    env = ElbowLiftEnv()
+    drive, limits, pid = RopeTension(), env.limits, PidSetpoint()
+    for sentence in (
+        f"{drive.rate_limit:g} N/s and follow with a lag of {drive.time_constant:g} s",
+        f"filter of {pid.filter_frequency:g} rad/s; its authority changes by at most {pid.authority_rate:g} 1/s",
+        f"the elbow leaves {limits.lowest_deg:g} to {limits.highest_deg:g} deg",
+        f"a rope exceeds {limits.tension:g} N",
+        f"elbow reaction exceeds {limits.reaction:g} N",
+        f"`episode_duration` ({env.duration:g} s)",
+        "load ({:g} to {:g} kg)".format(*env.load.limits()),
+    ):
+        assert sentence in re.sub(r"\s+", " ", PAGE), sentence
+
+
+def test_observations():
+    env, rows = ElbowLiftEnv(), _tables("Observation Space")[0]
+    assert len(rows) == env.observation_space.shape[0]
+    parts = [(s, label) for s in env.observation_structure for label in s.labels]
+    for k, ((number, name, low, high, unit, scale), (part, label)) in enumerate(zip(rows, parts, strict=True)):
+        assert (int(number), name) == (k, f"{part.name}, {label}" if label else part.name)
+        assert (unit, float(scale)) == (part.unit, part.scale)
+        assert (env.observation_space.low[k], env.observation_space.high[k]) == (float(low), float(high))
+
+
+def test_rewards():
+    assert {row[0]: float(row[2]) for row in _tables("Rewards")[0]} == Weights().model_dump()
+
+
+def test_arguments():
+    parameters = dict(inspect.signature(ElbowLiftEnv).parameters)
+    # What takes unknown ones to refuse them.
+    assert parameters.pop("unknown").kind is inspect.Parameter.VAR_KEYWORD
+    assert [row[0].strip("`") for row in _tables("Arguments")[0]] == list(parameters)
+    assert all(p.kind is inspect.Parameter.KEYWORD_ONLY for p in parameters.values())
+    for name, default, _ in _tables("Arguments")[0]:
+        wanted = parameters[name.strip("`")].default
+        if name != "`load`":
+            said = eval(default.strip("`"))  # noqa: S307  our own page
+            assert (list(wanted) if isinstance(wanted, tuple) else wanted) == said, name

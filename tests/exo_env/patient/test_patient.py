@@ -1,0 +1,101 @@
+"""A patient is data: it survives JSON and YAML, refuses what cannot be, and says where each range comes from."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dms_core.errors import InputError
+from dms_core.yaml_text import read_yaml
+from exo_env.ecosystem.arm import Arm, Person
+from exo_env.patient.patient import LONGEST_DELAY, PATIENT, Patient
+
+UNITS = ("[kg]", "[m]", "[-]", "[s]", "[s/rad]", "[rad/s]", "[Hz]", "[1/s]", "[rad]", "[1/(s rad)]", "[1/rad]")
+ONLY_IN_MUSCLES = {"body_mass", "height", "sex", "strength", "activation_time_scale", "deactivation_time_scale"}
+IMPAIRED = {
+    "sex": "female",
+    "height": 1.6,
+    "maximum_activation_flexors": 0.31,
+    "tremor_width": 0.7,
+    "stretch_delay": 0.04,
+}
+
+
+def test_default_is_the_papers_subject():
+    patient = Patient()
+    assert patient.person == Person()
+    facts = Arm().facts["muscle_defaults"]
+    found = patient.time_constants(Arm())
+    assert found == {name: facts[name] for name in ("activation_time_constant", "deactivation_time_constant")}
+
+
+def test_body_and_muscles_are_those_of_the_patient():
+    patient = Patient(body_mass=55.0, height=1.6, sex="female", strength=0.7, activation_time_scale=2.0)
+    assert patient.person == Person(body_mass=55.0, height=1.6, sex="female", strength=0.7)
+    healthy, slow = Patient().time_constants(Arm()), patient.time_constants(Arm())
+    assert slow["activation_time_constant"] == 2.0 * healthy["activation_time_constant"]
+    assert slow["deactivation_time_constant"] == healthy["deactivation_time_constant"]
+    Arm(patient.person).muscle("BRA", **slow)
+
+
+def test_json_and_yaml_and_back(tmp_path):
+    patient = Patient(**IMPAIRED)
+    text = json.dumps(patient.model_dump())
+    assert Patient(**json.loads(text)) == patient
+    (tmp_path / "patient.yaml").write_text(text)  # JSON is YAML
+    assert Patient(**read_yaml(tmp_path / "patient.yaml")) == patient
+
+
+def test_row_of_numbers_holds_every_field_that_is_not_in_the_muscles():
+    assert tuple(PATIENT) == tuple(range(len(PATIENT)))
+    assert set(PATIENT._fields) == Patient.model_fields.keys() - ONLY_IN_MUSCLES - {"expected_load"}
+    numbers = Patient(**IMPAIRED).numbers()
+    for name, index in PATIENT._asdict().items():
+        assert numbers[index] == getattr(Patient(**IMPAIRED), name)
+
+
+@pytest.mark.parametrize("name", [n for n in Patient.model_fields if n != "sex"])
+def test_every_number_has_unit_source_and_limits(name):
+    field = Patient.model_fields[name]
+    assert any(unit in field.description for unit in UNITS)
+    limits = {key: getattr(m, key) for m in field.metadata for key in ("ge", "gt", "le") if hasattr(m, key)}
+    low, high = limits.get("ge", limits.get("gt")), limits["le"]
+    sourced = "assumed" in field.description or any(
+        f"{author} {year}]" in field.description for author, year in _labels()
+    )
+    # "The same of the extensors" carries the label too; nothing rests on silence.
+    assert sourced, field.description
+    for bad in (low - 1.0, high + 1.0, float("nan"), float("inf"), "much", None):
+        with pytest.raises(InputError, match=name):
+            Patient(**{name: bad})
+    assert getattr(Patient(**{name: high}), name) == high
+
+
+def _labels():
+    """(author with bracket, year) of each source in the module's docstring."""
+    import exo_env.patient.patient
+
+    lines = [line.strip() for line in exo_env.patient.patient.__doc__.splitlines() if line.strip().startswith("[")]
+    labels = [line[: line.index("]")].rsplit(" ", 1) for line in lines]
+    assert len(labels) > 10
+    return labels
+
+
+def test_delays_fit_into_the_memory():
+    for name in ("neural_delay", "electromechanical_delay", "stretch_delay", "feedback_delay"):
+        with pytest.raises(InputError, match=name):
+            Patient(**{name: LONGEST_DELAY + 0.001})
+
+
+def test_unknown_key_and_sex_are_named():
+    with pytest.raises(InputError, match=r"unknown key 'weakness'.*maximum_activation_flexors"):
+        Patient(weakness=0.5)
+    with pytest.raises(InputError, match="sex = 'other'"):
+        Patient(sex="other")
+
+
+def test_patient_is_frozen():
+    with pytest.raises(Exception, match="frozen"):
+        Patient().height = 1.8
+    assert Patient().changed(height=1.8).height == 1.8
+    assert not np.isnan(Patient().numbers()).any()

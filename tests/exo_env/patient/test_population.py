@@ -1,0 +1,212 @@
+"""Populations: distributions against scipy's, the shipped files, and every mistake by file, key and value."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dms_core.config_files import configs
+from dms_core.errors import InputError
+from exo_env.patient.distributions import distribution, weighted
+from exo_env.patient.patient import Patient
+from exo_env.patient.population import Population, population, shipped_populations
+
+SHIPPED = ("evaluation", "healthy", "mixed", "stroke_mild", "stroke_severe", "wide")
+P = (np.arange(400) + 0.5) / 400
+"""Probabilities at which quantiles are compared."""
+WORSE = {
+    "maximum_activation_flexors": -1, "maximum_activation_extensors": -1, "strength": -1, "activation_time_scale": 1,
+    "deactivation_time_scale": 1, "neural_delay": 1, "electromechanical_delay": 1, "co_contraction": 1,
+    "spasticity_flexors": 1, "spasticity_extensors": 1, "stretch_threshold": -1, "tremor_amplitude": 1,
+    "fatigue_rate": 1, "recovery_rate": -1, "fatigued_at_start": 1, "slacking_rate": 1, "least_effort": -1,
+    "effort_recovery": -1, "feedback_gain": -1, "feedback_delay": 1,
+}  # fmt: skip
+"""Direction of impairment."""
+
+
+@pytest.mark.parametrize(
+    ("spec", "reference"),
+    [
+        ({"uniform": [0.3, 0.7]}, stats.uniform(0.3, 0.4)),
+        ({"log_uniform": [0.001, 0.1]}, stats.loguniform(0.001, 0.1)),
+        ({"normal": {"mean": 0.5, "deviation": 0.2, "low": 0.4, "high": 1.0}}, stats.truncnorm(-0.5, 2.5, 0.5, 0.2)),
+    ],
+)
+def test_quantiles_are_those_of_scipy(spec, reference):
+    d = distribution(spec)
+    # Both invert smooth functions to rounding; the normal's inverse loses a few digits.
+    np.testing.assert_allclose([d.quantile(p) for p in P], reference.ppf(P), rtol=1e-9)
+    low, high = d.limits()
+    assert (low, high) == pytest.approx(reference.support(), rel=1e-12)
+    assert low <= d.quantile(0.0) and d.quantile(1.0 - 2**-53) <= high
+
+
+def test_choice_and_constant():
+    d = distribution({"choice": ["male", "female"], "weights": [1, 3]})
+    assert [d.quantile(p) for p in (0.0, 0.2499, 0.25, 0.999)] == ["male", "male", "female", "female"]
+    assert distribution({"choice": [1.0, 2.0]}).quantile(0.6) == 2.0
+    assert distribution(0.4).quantile(0.9) == 0.4
+    assert weighted((1.0, 0.0), 1.0) == 0
+
+
+def test_six_populations_are_shipped():
+    assert shipped_populations() == SHIPPED
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_populations_give_patients(name):
+    found = Population.shipped(name)
+    assert found.title
+    generator = np.random.default_rng(0)
+    patients = [found.sample(generator) for _ in range(100)]
+    assert len(set(patients)) == 100
+    assert Population(**json.loads(json.dumps(found.model_dump()))) == found
+
+
+@pytest.mark.parametrize("name", [n for n in SHIPPED if n != "mixed"])
+def test_every_line_of_a_shipped_file_names_a_source_or_is_assumed(name):
+    lines = (configs() / "patients" / f"{name}.yaml").read_text().splitlines()
+    if name in ("evaluation", "wide"):
+        assert any("All ranges are assumed" in line for line in lines)
+        return
+    begin = lines.index("fields:")
+    for before, line in zip(lines[begin:], lines[begin + 1 :], strict=False):
+        if ":" in line and not line.strip().startswith("#"):
+            remark = line.partition("#")[2] or before.partition("#")[2]
+            assert any(word in remark for word in ("assumed", "[", "without effect", "as stroke_mild", "tremor")), line
+
+
+def test_wide_spans_the_three_of_mixed_and_an_eighth_more():
+    wide = Population.shipped("wide")
+    assert "wide" not in Population.shipped("mixed").mixture
+    for field, d in wide.distributions.items():
+        if field == "sex":
+            continue
+        ends = [part.distributions[field].limits() for part in Population.shipped("mixed").parts]
+        low, high = min(e[0] for e in ends), max(e[-1] for e in ends)
+        assert d.limits()[0] <= low and high <= d.limits()[-1], field
+
+
+def test_same_seed_same_patients_other_seed_others():
+    found = Population.shipped("mixed")
+    a, b, c = (np.random.default_rng(seed) for seed in (1, 1, 2))
+    first = [found.sample(a) for _ in range(20)]
+    assert first == [found.sample(b) for _ in range(20)]
+    assert first != [found.sample(c) for _ in range(20)]
+
+
+def test_order_in_the_file_does_not_matter():
+    fields = Population.shipped("stroke_mild").fields
+    turned = Population(fields=dict(reversed(fields.items())))
+    assert turned.sample(np.random.default_rng(4)) == Population(fields=fields).sample(np.random.default_rng(4))
+
+
+def test_mixture_by_its_weights():
+    found, generator = Population.shipped("mixed"), np.random.default_rng(0)
+    patients = [found.sample(generator) for _ in range(2000)]
+    healthy = np.mean([p.maximum_activation_flexors > 0.92 for p in patients])
+    severe = np.mean([p.spasticity_extensors >= 0.03 and p.neural_delay >= 0.05 for p in patients])
+    # 2000 draws of probability 0.2: standard error 0.009, four of them. Severe are all of one part and few of another.
+    assert healthy == pytest.approx(0.2, abs=0.036)
+    assert severe > 0.38
+
+
+def test_severity_rises_from_healthy_to_severe():
+    def mean(name, field):
+        d = Population.shipped(name).distributions[field]
+        return np.mean([d.quantile(p) for p in P])
+
+    for field, sign in WORSE.items():
+        courses = [sign * mean(n, field) for n in ("healthy", "stroke_mild", "stroke_severe")]
+        assert courses == sorted(courses), field
+
+
+def test_evaluation_is_wider_and_shifted():
+    evaluation, mixed = Population.shipped("evaluation"), Population.shipped("mixed")
+    assert "evaluation" not in mixed.mixture
+    for field, d in evaluation.distributions.items():
+        parts = [part.distributions[field] for part in mixed.parts]
+        if field == "sex":
+            assert d.weights != parts[0].weights
+            continue
+        low, high = min(p.limits()[0] for p in parts), max(p.limits()[-1] for p in parts)
+        assert d.limits()[0] <= low and high <= d.limits()[-1], field
+        assert d.limits() != (low, high), field
+        if field in WORSE:
+            trained = np.average(
+                [np.mean([p.quantile(x) for x in P]) for p in parts], weights=list(mixed.mixture.values())
+            )
+            assert WORSE[field] * (np.mean([d.quantile(x) for x in P]) - trained) > 0.0, field
+
+
+def test_body_mass_follows_height():
+    fixed = {"base": "healthy", "fields": {"body_mass_index": 25.0}}
+    for seed in range(5):
+        patient = population(fixed).sample(np.random.default_rng(seed))
+        assert patient.body_mass == pytest.approx(25.0 * patient.height**2, rel=1e-14)
+    plain = population({"base": "healthy", "fields": {"body_mass": 70.0}})
+    assert plain.sample(np.random.default_rng(0)).body_mass == 70.0
+
+
+def test_whatever_names_a_patient():
+    patient = Patient(height=1.6, maximum_activation_flexors=0.3)
+    generator = np.random.default_rng(0)
+    for source in (patient, {"height": 1.6, "maximum_activation_flexors": 0.3}, population(patient)):
+        assert population(source).sample(generator) == patient
+    assert population({}).sample(generator) == Patient()
+    assert population("healthy") == Population.shipped("healthy")
+
+
+def test_own_file(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: stroke_mild\nfields:\n  height: 1.5\n")
+    found = population(str(path)).sample(np.random.default_rng(0))
+    assert found.height == 1.5 and found.slacking_rate > 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("fields: {height: 1.7}", "missing body_mass, sex"),
+        ("base: healthy\nfields: {heigth: 1.7}", "unknown key 'heigth'.*height"),
+        ("base: healthy\nfields: {height: 3.0}", "height reaches 3.0"),
+        ("base: healthy\nfields: {height: {uniform: [1.6, 2.9]}}", "height reaches 2.9"),
+        ("base: healthy\nfields: {height: {uniform: [1.8, 1.6]}}", "height.*1.8, 1.6"),
+        ("base: healthy\nfields: {height: {uniform: [1.6]}}", "height.*uniform"),
+        ("base: healthy\nfields: {height: {normal: {mean: 1.7, low: 1, high: 2}}}", "height.*'deviation' is missing"),
+        ("base: healthy\nfields: {height: {gamma: 2}}", "height.*no distribution.*log_uniform"),
+        ("base: healthy\nfields: {height: }", "height: None is no distribution"),
+        ("base: healthy\nfields: {height: .nan}", "height.*nan"),
+        ("base: healthy\nfields: {height: tall}", "height reaches 'tall'"),
+        ("base: healthy\nfields: {neural_delay: {log_uniform: [0.0, 0.1]}}", "neural_delay.*above 0"),
+        ("base: healthy\nfields: {sex: {choice: [male, other]}}", "sex reaches 'other'"),
+        ("base: healthy\nfields: {sex: {choice: [male, female], weights: [1]}}", "sex.*one number from 0"),
+        ("base: healthy\nfields: {body_mass_index: 60, body_mass: 70}", "both given"),
+        ("base: healthy\nfields: {body_mass_index: 90}", "body_mass_index reaches 90"),
+        ("base: nobody\nfields: {height: 1.7}", "unknown population 'nobody'.*stroke_mild"),
+        ("base: mixed", "'mixed' is a mixture"),
+        ("mixture: {healthy: 1, sick: 1}", "unknown population 'sick'.*stroke_mild"),
+        ("mixture: {healthy: -1, stroke_mild: 2}", "mixture.*weights from 0"),
+        ("mixture: {healthy: 1}\nfields: {height: 1.7}", "either fields"),
+        ("title: nobody", "either fields"),
+        ("colour: red", "unknown key 'colour'"),
+        ("fields: [", "not valid YAML"),
+    ],
+)
+def test_mistakes_name_file_key_and_value(tmp_path, text, words):
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"(?s)mine.yaml.*{words}"):
+        population(str(path))
+
+
+@pytest.mark.parametrize("source", ["nobody", 3, None, ["healthy"]])
+def test_unknown_population_lists_the_shipped(source):
+    with pytest.raises(InputError, match="evaluation, healthy, mixed, stroke_mild, stroke_severe"):
+        population(source)
+
+
+def test_patient_given_as_a_mapping_is_checked():
+    with pytest.raises(InputError, match="height = 9"):
+        population({"height": 9.0})

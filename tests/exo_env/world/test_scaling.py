@@ -1,0 +1,92 @@
+"""Numbers and start of a rig against those of a model declared, placed and assembled for the same patient."""
+
+import numpy as np
+import pytest
+
+from dms_core import Model
+from exo_env.drives.drive import DRIVES
+from exo_env.ecosystem.arm import MUSCLES, Arm
+from exo_env.ecosystem.ecosystem import Ecosystem
+from exo_env.ecosystem.gym_machine import ROPE
+from exo_env.envs.elbow_lift import ElbowLiftEnv
+from exo_env.patient.patient import Patient
+from exo_env.patient.population import population
+from exo_env.world.scaling import Numbers, declared, fitting, numbers_of, template
+
+MODES = tuple(DRIVES)
+PATIENTS = (
+    *(population("evaluation").sample(np.random.default_rng(k)) for k in range(6)),
+    Patient(body_mass=20.0, height=1.0, sex="female", strength=0.1, activation_time_scale=5.0),
+    Patient(body_mass=250.0, height=1.7, strength=5.0, activation_time_scale=4.5, deactivation_time_scale=0.5),
+)
+
+
+def declared_model(patient: Patient, weight: float, mode: str, **start) -> Model:
+    """As an episode would have to be made without fitting."""
+    joined, drive = Ecosystem(person=patient.person, weight=weight), DRIVES[mode]()
+    times = patient.time_constants(Arm(patient.person))
+    return Model(declared(joined, drive, times=times, **start), like=template(mode))
+
+
+def rope_number(model: Model) -> int:
+    """Place of the gym rope's length in the numbers of constraints."""
+    calls = model.tables.values.constraints
+    return int(calls.par_ptr[[c.element.name for c in model.layout.constraints].index(ROPE)])
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("patient", PATIENTS)
+def test_numbers_are_those_of_the_declared_patient(mode, patient):
+    weight = 0.5 + patient.height
+    found = fitting(Ecosystem(), mode, DRIVES[mode]()).numbers(patient, weight)
+    model = declared_model(patient, weight, mode, start=1.0, held=np.zeros(2))
+    wanted = numbers_of(model, Arm(patient.person))
+    rope = rope_number(model)
+    found.model[1][rope] = wanted.model[1][rope]
+    pairs = [*zip(found.model, wanted.model, strict=True), *zip(found[2:], wanted[2:], strict=True)]
+    assert len(pairs) == 6 + len(Numbers._fields) - 2
+    for x, y in pairs:
+        # Ten equations solved to rounding, for numbers up to a hundred times those they were solved for.
+        # Parts of a point that cancel are true to rounding of a metre; what is 0 for all is 0.
+        np.testing.assert_allclose(x, y, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("angle_deg", [20.0, 63.0, 100.0])
+def test_start_is_that_of_the_declared_patient(mode, angle_deg):
+    env = ElbowLiftEnv(action_mode=mode, patient="evaluation")
+    env.reset(seed=int(angle_deg), options={"initial_angle_deg": angle_deg})
+    episode = env.episode
+    patient, state = episode.patient, episode.world.state
+    activations = state.q[[episode.model.layout.index[f"{m}.activation"] for m in MUSCLES]]
+    model = declared_model(
+        patient, episode.load, mode, start=np.radians(angle_deg), held=env.packed.values.commands,
+        reference=episode.repetition.signal, activations=activations,
+    )  # fmt: skip
+    rope = rope_number(model)
+    assert episode.model.numbers[1][rope] == pytest.approx(model.numbers[1][rope], abs=1e-11)
+    # Lengths and Euler parameters to rounding; tensions are of the order of 100 N.
+    np.testing.assert_allclose(state.q, model.start.q, rtol=1e-10, atol=1e-11)
+    slow = np.array([not name.endswith((".fibre_length", ".activation", ".tension")) for name in model.layout.names])
+    # The rates of fibres, activations and tensions follow from their equations when the world settles.
+    np.testing.assert_allclose(state.v[slow], model.start.v[slow], atol=1e-11)
+
+
+def test_a_rig_forgets_the_patient_before():
+    """A seed gives the same bits, whoever sat in the rig before and however the episode ended."""
+    used, fresh = ElbowLiftEnv(patient="evaluation"), ElbowLiftEnv(patient="evaluation")
+    for seed in (3, 4):
+        used.reset(seed=seed, options={"reference": {"rest": 0.0}})
+        for _ in range(40):
+            *_, terminated, _, _ = used.step(np.array([1.0, 1.0]))
+            if terminated:
+                break
+    actions = np.random.default_rng(0).uniform(-1.0, 0.2, (50, 2))
+    for a, b in zip((used.reset(seed=9)), (fresh.reset(seed=9)), strict=True):
+        assert str(a) == str(b)
+    for action in actions:
+        one, other = used.step(action), fresh.step(action)
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:4] == other[1:4]
+    for name, value in used.readings().items():
+        assert value == fresh.readings()[name], name
