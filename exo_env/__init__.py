@@ -22,8 +22,8 @@ moved_modules("exo_env", MOVED)
 # Gymnasium's passive checker takes a first reset that raised for done, and breaks at the next step; the environment
 # checks its arguments itself.
 register(
-    id="exo/ElbowLift-v0",
+    id="exo/ElbowLift-v1",
     entry_point="exo_env.envs.elbow_lift:ElbowLiftEnv",
-    vector_entry_point="exo_env.envs.vector_env:ElbowLiftVectorEnv",
+    vector_entry_point="exo_env.envs.elbow_lift:ElbowLiftVectorEnv",
     disable_env_checker=True,
 )

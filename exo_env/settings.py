@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -23,6 +24,10 @@ class Settings(BaseModel):
         except ValidationError as error:
             raise InputError(explain(type(self), data, error)) from None
 
+    def __hash__(self) -> int:
+        """Of the class and all values, which may be mappings too."""
+        return hash((type(self), self.model_dump_json()))
+
     @classmethod
     def from_config(cls, name: str) -> Self:
         """These settings from a shipped file, by its path inside `configs`.
@@ -37,5 +42,22 @@ class Settings(BaseModel):
             raise InputError(f"{path}: {error}") from None
 
     def changed(self, **changes: Any) -> Self:
-        """A checked copy with other values."""
-        return type(self)(**{**dict(self), **changes})
+        """A checked copy with other values; a mapping given for settings within these changes only what it names.
+
+        Example:
+            >>> device.changed(lower_link={"mass": 1.0}).lower_link.inertia == device.lower_link.inertia
+            True
+        """
+        merged = {name: _merged(getattr(self, name, None), change) for name, change in changes.items()}
+        return type(self)(**{**dict(self), **merged})
+
+
+def _merged(now: Any, change: Any) -> Any:
+    """A value with a change in it: settings and mappings of settings are changed by mappings, all else is replaced."""
+    if not isinstance(change, Mapping):
+        return change
+    if isinstance(now, Settings):
+        return now.changed(**change)
+    if isinstance(now, Mapping) and now and all(isinstance(x, Settings) for x in now.values()):
+        return {**now, **{name: _merged(now.get(name), x) for name, x in change.items()}}
+    return change

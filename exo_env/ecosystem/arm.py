@@ -1,4 +1,4 @@
-"""The subject: torso, humerus and forearm (ulna, radius and hand) of arm26 with its six muscles, scaled to a person.
+"""The arm of a subject: torso, humerus and forearm (ulna, radius and hand) with their muscles, scaled to a person.
 
 Shoulder at 0, so that all frames are parallel to ground where the elbow is straight; the elbow turns about arm26's own
 tilted axis. Muscles run straight through their points: below 8 degrees BRA passes behind the elbow axis and beyond
@@ -19,28 +19,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import radians
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
-from dms_core.config_files import config_file
 from dms_core.model import GROUND, Fixed, PathPoint, Revolute, RigidBody, ThelenMuscle
-from dms_core.model.element import Constraint, Vector
+from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.geometry.frames import quaternion, rotation_matrix, unit
-from dms_core.yaml_text import read_yaml
-from exo_env.settings import Settings
+from exo_env.ecosystem.person import HEIGHT_0, MASS_0, Person
+from exo_env.ecosystem.subject import BODY_ROLES, DEFAULT, subject_facts
 
-MUSCLES = ("TRIlong", "TRIlat", "TRImed", "BIClong", "BICshort", "BRA")
-FLEXORS = ("BIClong", "BICshort", "BRA")
-EXTENSORS = ("TRIlong", "TRIlat", "TRImed")
-SUBJECT_FILE = "subject/arm26.yaml"
-BODIES = {"torso": "base", "humerus": "r_humerus", "forearm": "r_ulna_radius_hand"}
-"""Our names and those of the model file."""
 ELBOW = "elbow"
-MASS_0, HEIGHT_0 = 68.8034, 1.741
-"""Body mass [kg] and height [m] of arm26. Inference: its segment masses are de Leva's male fractions of 68.8034 kg, and
-its forearm's centre of mass is that of de Leva's mean male forearm and hand, whose stature is 1.741 m."""
 MASS_FRACTION = {
     "male": {"torso": 0.4346, "humerus": 0.0271, "forearm": 0.0162 + 0.0061},
     "female": {"torso": 0.4257, "humerus": 0.0255, "forearm": 0.0138 + 0.0056},
@@ -51,25 +40,8 @@ LENGTH_FRACTION = {
     "female": {"torso": 0.6148 / 1.735, "humerus": 0.2751 / 1.735, "forearm": 0.2643 / 1.735},
 }
 """Segment length over height (de Leva 1996, table 4)."""
-GRIP = (0.0, -0.337, 0.0)
-"""Centre of the grip in the forearm's frame [m]: de Leva's centre of mass of the hand, 0.2689 + 0.79 x 0.0862 m."""
 TORSO_RADIUS = 0.17
 """Radius of gyration of the torso about every axis [m], assumed; without effect, since it is fixed to ground."""
-
-
-class Person(Settings):
-    """Who is in the device. The defaults are arm26 unchanged."""
-
-    body_mass: float = Field(default=MASS_0, ge=20.0, le=250.0, description="body mass M [kg]")
-    height: float = Field(default=HEIGHT_0, ge=1.0, le=2.3, description="height H [m]")
-    sex: Literal["male", "female"] = Field(default="male", description="whose segment fractions are used")
-    strength: float = Field(default=1.0, gt=0.0, le=5.0, description="factor on every muscle's F0 [-]")
-
-
-@cache
-def _facts() -> dict[str, Any]:
-    """The file of arm26, read once."""
-    return read_yaml(config_file(SUBJECT_FILE))
 
 
 class Segment(NamedTuple):
@@ -90,15 +62,28 @@ class Arm:
     """The arm of a person: what the simulated subject is made of, and what a subject knows of itself.
 
     Args:
-        person: whom to scale arm26 to.
+        person: whom to scale the subject's anatomy to.
+        subject: anatomy, a shipped one by name or a YAML file (subject.py).
     """
 
     person: Person = Person()
+    subject: str = DEFAULT
 
     @property
     def facts(self) -> dict[str, Any]:
-        """The file of arm26."""
-        return _facts()
+        """The file of the subject."""
+        return subject_facts(self.subject)
+
+    @property
+    def muscles(self) -> tuple[str, ...]:
+        """Names of the muscles; everything that has one number a muscle has them in this order."""
+        return tuple(self.facts["muscles"])
+
+    @property
+    def signs(self) -> np.ndarray:
+        """+1 for a flexor, -1 for an extensor, shape (n,)."""
+        flexors = self.facts["roles"]["flexors"]
+        return np.array([1.0 if m in flexors else -1.0 for m in self.muscles])
 
     @property
     def gravity(self) -> Vector:
@@ -119,17 +104,17 @@ class Arm:
     @cached_property
     def segments(self) -> dict[str, Segment]:
         """The scaled bodies by our names."""
-        joints = self.facts["joints"]
-        at = np.array(joints["offset"]["point_i"])
+        joints, roles = self.facts["joints"], self.facts["roles"]
+        at = np.array(joints[roles["mount"]]["point_i"])
         found = {}
         offset = {
             "torso": np.zeros(3),
-            "humerus": joints["r_shoulder"]["point_i"],
-            "forearm": joints["r_elbow"]["point_i"],
+            "humerus": joints[roles["shoulder"]]["point_i"],
+            "forearm": joints[roles["elbow"]]["point_i"],
         }
         parent = {"torso": "torso", "humerus": "torso", "forearm": "humerus"}
-        for name, their_name in BODIES.items():
-            body, k, f = self.facts["bodies"][their_name], self.length_factor(name), self.mass_factor(name)
+        for name in BODY_ROLES:
+            body, k, f = self.facts["bodies"][roles[name]], self.length_factor(name), self.mass_factor(name)
             at = at + self.length_factor(parent[name]) * np.asarray(offset[name])
             mass, inertia = f * body["mass"], f * k * k * np.array(body["inertia"])
             if name == "torso":
@@ -141,7 +126,7 @@ class Arm:
     @cached_property
     def axis(self) -> np.ndarray:
         """Elbow axis, flexion positive, in humerus and ground axes [-]."""
-        return unit(self.facts["joints"]["r_elbow"]["axis_i"], "elbow axis")
+        return unit(self.facts["joints"][self.facts["roles"]["elbow"]]["axis_i"], "elbow axis")
 
     @property
     def elbow(self) -> np.ndarray:
@@ -151,7 +136,7 @@ class Arm:
     @property
     def grip(self) -> np.ndarray:
         """Centre of the grip in the forearm's frame [m]."""
-        return self.length_factor("forearm") * np.array(GRIP)
+        return self.length_factor("forearm") * np.array(self.facts["grip"])
 
     def rotation(self, flexion: float) -> np.ndarray:
         """A of the forearm at an elbow angle [rad], shape (3, 3)."""
@@ -186,6 +171,10 @@ class Arm:
             ),
         ]  # fmt: skip
 
+    def forces(self) -> list[Force]:
+        """What acts in the joints beside the muscles: elements that read traits of the person with `acts="joint"`."""
+        return []
+
     def path(self, muscle: str, *, welded: bool = False) -> tuple[PathPoint, ...]:
         """Points of a muscle; with `welded`, torso and humerus are parts of the ground."""
         if (muscle, welded) not in self._paths:
@@ -198,7 +187,7 @@ class Arm:
         return {}
 
     def _path(self, muscle: str, welded: bool) -> tuple[PathPoint, ...]:
-        ours = {theirs: name for name, theirs in BODIES.items()}
+        ours = {self.facts["roles"][name]: name for name in BODY_ROLES}
         points = []
         for p in self.facts["muscles"][muscle]["path"]:
             body = ours[p["body"]]
@@ -242,8 +231,9 @@ class Arm:
     def _path_factors(self) -> dict[str, float]:
         """Length of each muscle's scaled path over that of arm26, at 90 degrees [-]."""
         if self.person.height == HEIGHT_0 and self.person.sex == "male":
-            return dict.fromkeys(MUSCLES, 1.0)
-        return {name: self.muscle_geometry(name, radians(90.0))[0] / x for name, x in _path_lengths().items()}
+            return dict.fromkeys(self.muscles, 1.0)
+        lengths = _path_lengths(self.subject)
+        return {name: self.muscle_geometry(name, radians(90.0))[0] / x for name, x in lengths.items()}
 
     def inertia_about_elbow(self) -> float:
         """Generalised inertia of the forearm about the elbow axis [kg m^2]."""
@@ -259,9 +249,10 @@ class Arm:
 
 
 @cache
-def _path_lengths() -> dict[str, float]:
-    """Of arm26's muscles at 90 degrees [m]."""
-    return {name: Arm().muscle_geometry(name, radians(90.0))[0] for name in MUSCLES}
+def _path_lengths(subject: str) -> dict[str, float]:
+    """Length of each muscle's path before it is scaled, at 90 degrees [m]."""
+    arm = Arm(subject=subject)
+    return {name: arm.muscle_geometry(name, radians(90.0))[0] for name in arm.muscles}
 
 
 def excitation_name(muscle: str) -> str:

@@ -18,7 +18,7 @@ from dms_core.errors import InputError, choices
 from dms_core.model import GROUND, Gravity, Input, JointAngle, JointReaction, MuscleSensor, Revolute, Steps, System
 from dms_core.model.sensors.muscle import Component
 from dms_core.model.signals import AnySignal
-from exo_env.ecosystem.arm import ELBOW, MUSCLES, Arm, excitation_name
+from exo_env.ecosystem.arm import ELBOW, Arm, excitation_name
 
 TIME = "time_s"
 COMPONENTS: dict[Component, str] = {
@@ -60,14 +60,14 @@ def bare_arm(
         ],
         forces=[
             Gravity(name="gravity", acceleration=arm.gravity),
-            *(arm.muscle(m, path=arm.path(m, welded=True), start_activation=start_activation) for m in MUSCLES),
+            *(arm.muscle(m, path=arm.path(m, welded=True), start_activation=start_activation) for m in arm.muscles),
         ],
         sensors=[
             JointAngle(name="elbow_angle", joint=ELBOW),
-            *(MuscleSensor(name=f"{m}.sensor", muscle=m, components=tuple(COMPONENTS)) for m in MUSCLES),
+            *(MuscleSensor(name=f"{m}.sensor", muscle=m, components=tuple(COMPONENTS)) for m in arm.muscles),
             JointReaction(name="elbow_reaction", constraint=ELBOW, body="forearm"),
         ],
-        inputs=[Input(name=excitation_name(m), signal=excitations[m]) for m in MUSCLES],
+        inputs=[Input(name=excitation_name(m), signal=excitations[m]) for m in arm.muscles],
     )  # fmt: skip
 
 
@@ -103,12 +103,12 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
         )
     if times[0] > 0.0:
         raise InputError(f"excitations '{path}': the first row is at {TIME} = {times[0]:g}; give one at 0 or before.")
-    return {m: Steps(times=tuple(times), values=tuple(table[m])) for m in MUSCLES}
+    return {m: Steps(times=tuple(times), values=tuple(table[m])) for m in Arm().muscles}
 
 
 def _check_header(path: Path, header: list[str]) -> None:
     """Exactly the wanted columns, in any order."""
-    wanted = {TIME, *MUSCLES}
+    wanted = {TIME, *Arm().muscles}
     if len(header) == 1 and ";" in header[0]:
         raise InputError(f"excitations '{path}': the columns are separated by semicolons; separate them by commas.")
     for name in header:
@@ -154,7 +154,7 @@ def table(trajectory: Trajectory, sample: float) -> dict[str, np.ndarray]:
         "elbow_speed_rad_per_s": y["elbow_angle.rate"],
         "elbow_acceleration_rad_per_s2": y["elbow_angle.acceleration"],
     }
-    columns |= {f"{m}_{end}": y[f"{m}.sensor.{c}"] for c, end in COMPONENTS.items() for m in MUSCLES}
+    columns |= {f"{m}_{end}": y[f"{m}.sensor.{c}"] for c, end in COMPONENTS.items() for m in Arm().muscles}
     return columns | {f"elbow_reaction_on_forearm_{end}": y[f"elbow_reaction.{c}"] for c, end in REACTION.items()}
 
 

@@ -10,45 +10,37 @@ Inputs: "psi" the reference [rad], "assistance" the authority of the controller 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Self
+from typing import Protocol, Self
 
 from pydantic import Field, model_validator
 
-from dms_core.model import (
-    Constant,
-    DelayedError,
-    Gravity,
-    Input,
-    JointAngle,
-    JointMoment,
-    JointReaction,
-    MuscleSensor,
-    RopeSensor,
-    System,
-    Tracking,
-)
-from dms_core.model.element import Force, Sensor
+from dms_core.model import Constant, DelayedError, Gravity, Input, RigidBody, System
+from dms_core.model.element import Constraint, Force
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.model.sensors.muscle import Component
 from dms_core.model.signals import AnySignal
-from exo_env.ecosystem.arm import ELBOW, FLEXORS, MUSCLES, Arm, Person, excitation_name
-from exo_env.ecosystem.exoskeleton import (
-    AGONIST,
-    ANTAGONIST,
-    GUIDE,
-    HINGE,
-    LOWER,
-    PID,
-    Exoskeleton,
-    GuideKind,
-    Misalignment,
-    WornExoskeleton,
-)
-from exo_env.ecosystem.gym_machine import ROPE, GymMachine, LoadedMachine
+from exo_env.ecosystem.arm import ELBOW, Arm, excitation_name
+from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.gym_machine import GymMachine, LoadedMachine
+from exo_env.ecosystem.person import Person
+from exo_env.ecosystem.sensors import sensors
+from exo_env.ecosystem.subject import DEFAULT
+from exo_env.ecosystem.worn_exoskeleton import GuideKind, Misalignment, WornExoskeleton
 from exo_env.settings import Settings
 
 REFERENCE, ASSISTANCE, REFLEX = "psi", "assistance", "proprioception"
-MUSCLE_COMPONENTS: tuple[Component, ...] = ("length", "fibre_length", "fibre_velocity", "activation", "tendon_force")
+
+
+class Part(Protocol):
+    """What joins the system beside arm, device and machine."""
+
+    def bodies(self, flexion: float) -> Sequence[RigidBody]:
+        """Its bodies where the elbow rests at an angle [rad]."""
+
+    def joints(self) -> Sequence[Constraint]:
+        """What holds them."""
+
+    def forces(self) -> Sequence[Force]:
+        """What acts on them, or on the bodies of arm, device and machine."""
 
 
 class Proprioception(Settings):
@@ -64,6 +56,7 @@ class Ecosystem(Settings):
     """What is joined. The defaults are the paper's system with arm26 and one kilogram."""
 
     person: Person = Person()
+    subject: str = Field(default=DEFAULT, description="anatomy: a shipped subject by name, or a YAML file")
     device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.from_config("exoskeletons/elbow.yaml"))
     machine: GymMachine | None = Field(
         default_factory=lambda: GymMachine.from_config("gym_machine/pulley.yaml"), description="None: the hand is empty"
@@ -81,6 +74,23 @@ class Ecosystem(Settings):
                 f"guide '{self.guide}' with a misaligned device locks the elbow; the one-row guide 'plane' lets it move"
             )
         return self
+
+    def arm(self) -> Arm:
+        """The arm of the person."""
+        return Arm(self.person, self.subject)
+
+    def worn(self) -> WornExoskeleton:
+        """The device on this arm."""
+        return WornExoskeleton(self.device, self.arm(), self.misalignment, self.guide)
+
+    def more_parts(self, arm: Arm, worn: WornExoskeleton) -> Sequence[Part]:
+        """Parts beside arm, device and machine: none here; an ecosystem of one's own gives them.
+
+        In an environment their bodies must not move where the elbow rests, and every number of theirs must be linear in
+        the monomials of world/scaling.py, as that of a constant spring, of a mass or of a length that grows with the
+        height is; a number that is not is refused by name.
+        """
+        return ()
 
     def system(
         self,
@@ -103,16 +113,17 @@ class Ecosystem(Settings):
             excitations: course of each muscle's excitation [-]; a muscle that is not named stays at its minimum.
             assistance: authority of the controller, 0 to 1 [-].
             start_activation: activation of each muscle at the start [-]; default: the minimum.
-            start_tension: of the agonist rope [N]; default: that of a command without error.
+            start_tension: of the rope that lifts [N]; default: that of a command without error.
             muscle_times: activation and deactivation time constants of every muscle, as fields of ThelenMuscle [s].
-            device_forces: controller, motors and ropes of the worn device; default: its own PID on both ropes.
+            device_forces: controller, motors and ropes of the worn device; default: its own PID on all ropes.
             device_inputs: inputs that these read beside the reference; default: the authority.
         """
-        arm = Arm(self.person)
-        worn = WornExoskeleton(self.device, arm, self.misalignment, self.guide)
+        arm, worn = self.arm(), self.worn()
         machine = [] if self.machine is None else [LoadedMachine(self.machine, arm, self.weight)]
-        parts: list[Arm | WornExoskeleton | LoadedMachine] = [arm, worn, *machine]
-        commands: dict[str, AnySignal] = {m: (excitations or {}).get(m, Constant(value=MINIMUM)) for m in MUSCLES}
+        beside = [*machine, *self.more_parts(arm, worn)]
+        parts: list[Arm | WornExoskeleton | Part] = [arm, worn, *beside]
+        given = excitations or {}
+        commands: dict[str, AnySignal] = {m: given.get(m, Constant(value=MINIMUM)) for m in arm.muscles}
         return System(
             "human-exoskeleton ecosystem",
             bodies=[body for part in parts for body in part.bodies(start)],
@@ -125,9 +136,10 @@ class Ecosystem(Settings):
                     if device_forces
                     else worn.forces(REFERENCE, ASSISTANCE, start_tension=start_tension)
                 ),
-                *(force for part in machine for force in part.forces()),
+                *(force for part in beside for force in part.forces()),
+                *arm.forces(),
             ],
-            sensors=sensors(gym=self.machine is not None),
+            sensors=sensors(arm.muscles, tuple(self.device.ropes), gym=self.machine is not None),
             inputs=[
                 Input(name=REFERENCE, signal=reference),
                 *(device_inputs or [Input(name=ASSISTANCE, signal=Constant(value=assistance))]),
@@ -136,30 +148,12 @@ class Ecosystem(Settings):
         )
 
     def _muscles(self, arm: Arm, start_activation: Mapping[str, float], times: Mapping[str, float]) -> list[Force]:
-        """The six muscles, behind the feedback that they read."""
+        """The muscles, behind the feedback that they read."""
         p = self.proprioception
         forces: list[Force] = []
         if p.gain > 0.0:
             forces.append(DelayedError(name=REFLEX, joint=ELBOW, reference=REFERENCE, delay=p.delay))
-        for m in MUSCLES:
-            reflex = {"reflex": f"{REFLEX}.error", "reflex_gain": p.gain if m in FLEXORS else -p.gain} if p.gain else {}
+        for m, sign in zip(arm.muscles, arm.signs.tolist(), strict=True):
+            reflex = {"reflex": f"{REFLEX}.error", "reflex_gain": sign * p.gain} if p.gain else {}
             forces.append(arm.muscle(m, start_activation=start_activation.get(m, MINIMUM), **reflex, **times))
         return forces
-
-
-def sensors(*, gym: bool) -> list[Sensor]:
-    """What the paper's figures show, and what tells whether a run can be believed; `gym`: a weight is in the hand."""
-    gym_rope = [RopeSensor(name="gym_rope_tension", rope=ROPE, components=("tension",))] if gym else []
-    return [
-        JointAngle(name="elbow_angle", joint=ELBOW),
-        JointAngle(name="exo_angle", joint=HINGE),
-        Tracking(name="tracking", pid=PID),
-        *(MuscleSensor(name=f"{m}.sensor", muscle=m, components=MUSCLE_COMPONENTS) for m in MUSCLES),
-        RopeSensor(name="agonist_tension", rope=AGONIST, components=("tension",)),
-        RopeSensor(name="antagonist_tension", rope=ANTAGONIST, components=("tension",)),
-        *gym_rope,
-        JointMoment(name="muscle_moment", joint=ELBOW, elements=MUSCLES, bodies=("forearm",)),
-        JointMoment(name="exo_moment", joint=HINGE, elements=(AGONIST, ANTAGONIST), bodies=(LOWER,)),
-        JointReaction(name="elbow_reaction", constraint=ELBOW, body="forearm"),
-        JointReaction(name="guide_force", constraint=GUIDE, body="forearm"),
-    ]

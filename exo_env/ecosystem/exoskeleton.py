@@ -9,36 +9,20 @@ point slides in the plane. With a line or a slider instead, rows are redundant a
 from __future__ import annotations
 
 import math
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from dms_core.model import (
-    Fixed,
-    JointSpringDamper,
-    LineGuide,
-    PathPoint,
-    Pid,
-    PlaneGuide,
-    Revolute,
-    RigidBody,
-    RopeActuator,
-    RopeForce,
-    Slider,
-)
-from dms_core.model.element import Constraint, Force, Vector
-from dms_core.model.geometry.frames import quaternion, quaternion_product
+from dms_core.errors import choices
+from dms_core.model.element import Vector
 from dms_core.model.geometry.rotations import dot, sub
-from exo_env.ecosystem.arm import Arm
 from exo_env.jit import compiled
 from exo_env.settings import Settings
 
-UPPER, LOWER, HINGE, GUIDE, PID = "upper_link", "lower_link", "exo_hinge", "guide", "pid"
-RopeName = Literal["agonist", "antagonist"]
-AGONIST: RopeName = "agonist"
-ANTAGONIST: RopeName = "antagonist"
-GuideKind = Literal["plane", "line", "slider"]
+TWO_ROPES = {"agonist": "flexion", "antagonist": "extension"}
+"""Ropes of a device file of version 0.1, and which way each turns the elbow."""
 
 
 class Link(Settings):
@@ -54,10 +38,16 @@ class Link(Settings):
 
 
 class Rope(Settings):
-    """Both ends of a rope."""
+    """Both ends of a rope, and which way it turns the elbow."""
 
     upper: Vector = Field(description="on the upper link [m]")
     lower: Vector = Field(description="on the lower link [m]")
+    pulls: Literal["flexion", "extension"] = Field(description="direction in which its tension turns the elbow")
+
+    @property
+    def sign(self) -> Literal[1, -1]:
+        """+1 for a rope that flexes, -1 for one that extends."""
+        return 1 if self.pulls == "flexion" else -1
 
 
 class Actuator(Settings):
@@ -84,30 +74,56 @@ class CriticalOscillation(Settings):
     Tc: float = Field(gt=0.0, description="critical period [s]")
 
 
-class Misalignment(Settings):
-    """How the device is worn: hinge against elbow, in the axes of the links."""
-
-    shift: Vector = Field(default=(0.0, 0.0, 0.0), description="of the hinge from the elbow centre [m]")
-    tilt_deg: tuple[float, float] = Field(default=(0.0, 0.0), description="of the hinge axis about x, then y [deg]")
-
-
 class Exoskeleton(Settings):
     """A device, as in configs/exoskeletons."""
 
     upper_link: Link
     lower_link: Link
     hinge_damping: float = Field(ge=0.0, description="viscous friction [N m s/rad]")
-    agonist: Rope
-    antagonist: Rope
+    ropes: dict[str, Rope] = Field(min_length=1, description="ropes by name, each with a motor of its own")
     guide_distance: float = Field(gt=0.0, description="from the hinge to the guided point of the forearm [m]")
     actuator: Actuator
     tuning: CriticalOscillation
     gains: PidGains
     drift_gain: float = Field(ge=0.0, description="feedback of the error coordinate's drift [1/s]")
 
-    def moment_arm(self, rope: RopeName, angle: float) -> float:
+    @model_validator(mode="before")
+    @classmethod
+    def _named_ropes(cls, data: Any) -> Any:
+        """Files of version 0.1 name two ropes, 'agonist' and 'antagonist', beside the links."""
+        if not isinstance(data, Mapping) or not set(TWO_ROPES) & set(data):
+            return data
+        given = {name: dict(data[name]) for name in TWO_ROPES if isinstance(data.get(name), Mapping)}
+        ropes = {**dict(data.get("ropes", {})), **{k: {"pulls": TWO_ROPES[k], **x} for k, x in given.items()}}
+        return {**{k: x for k, x in data.items() if k not in given}, "ropes": ropes}
+
+    @model_validator(mode="after")
+    def _can_lift(self) -> Self:
+        if all(rope.sign < 0 for rope in self.ropes.values()):
+            raise ValueError(f"ropes {choices(self.ropes)} all pull into extension; expected one that flexes the elbow")
+        return self
+
+    def changed(self, **changes: Any) -> Self:
+        """As `Settings.changed`; a rope may be changed by its name alone, as in files of version 0.1."""
+        by_name = {name: x for name, x in changes.items() if name in self.ropes}
+        others = {name: x for name, x in changes.items() if name not in self.ropes}
+        if by_name:
+            others["ropes"] = {**others.get("ropes", {}), **by_name}
+        return super().changed(**others)
+
+    @property
+    def lifting_rope(self) -> str:
+        """Name of the first rope that flexes the elbow: at the start of an episode it holds what the muscles do not."""
+        return next(name for name, rope in self.ropes.items() if rope.sign > 0)
+
+    @property
+    def lowering_rope(self) -> str | None:
+        """Name of the first rope that extends the elbow, None where there is none."""
+        return next((name for name, rope in self.ropes.items() if rope.sign < 0), None)
+
+    def moment_arm(self, rope: str, angle: float) -> float:
         """-dl/dtheta of a rope at a hinge angle [rad]; positive where its tension flexes [m]."""
-        ends: Rope = getattr(self, rope)
+        ends = self.ropes[rope]
         return rope_lever(np.array(ends.upper), np.array(ends.lower), angle)
 
     def own_moment(self, angle: float, gravity: float) -> float:
@@ -128,96 +144,3 @@ def rope_lever(upper, lower, angle):
 def link_moment(link, angle, gravity):
     """Moment that holds the lower link at a hinge angle [rad] [Nm]; link: mass and centre of mass, shape (4,)."""
     return link[0] * gravity * (link[1] * math.cos(angle) - link[2] * math.sin(angle))
-
-
-def link_axes(arm: Arm) -> np.ndarray:
-    """Axes x, y, z of an aligned link where the elbow is straight, as columns in ground axes, shape (3, 3)."""
-    z = arm.axis
-    y = np.array([0.0, 1.0, 0.0]) - z[1] * z
-    y /= np.linalg.norm(y)
-    return np.column_stack([np.cross(y, z), y, z])
-
-
-def _orientation(axes: np.ndarray) -> np.ndarray:
-    """Euler parameters of a rotation matrix near the identity."""
-    p0 = 0.5 * np.sqrt(1.0 + np.trace(axes))
-    e = np.array([axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]]) / (4.0 * p0)
-    return np.concatenate([[p0], e])
-
-
-class WornExoskeleton:
-    """A device on an arm: its bodies, constraints and forces.
-
-    Args:
-        device: the exoskeleton.
-        arm: whose humerus carries it.
-        misalignment: how it sits.
-        guide: 'plane' (one row), 'line' (two) or 'slider' (five).
-    """
-
-    def __init__(self, device: Exoskeleton, arm: Arm, misalignment: Misalignment, guide: GuideKind = "plane") -> None:
-        self.device, self.arm, self.guide_kind = device, arm, guide
-        axes = link_axes(arm)
-        about_x, about_y = (math.radians(x) for x in misalignment.tilt_deg)
-        tilt = quaternion_product(quaternion((1, 0, 0), about_x), quaternion((0, 1, 0), about_y))
-        self.axes = axes
-        self.orientation = quaternion_product(_orientation(axes), tilt)
-        self.origin = arm.elbow + axes @ np.array(misalignment.shift)
-
-    def bodies(self, flexion: float) -> list[RigidBody]:
-        """Both links with the hinge at `flexion` [rad], at rest."""
-        turned = quaternion_product(self.orientation, quaternion((0, 0, 1), flexion))
-        return [
-            RigidBody(name=name, **dict(link), position=tuple(self.origin), orientation=tuple(p))
-            for name, link, p in (
-                (UPPER, self.device.upper_link, self.orientation),
-                (LOWER, self.device.lower_link, turned),
-            )
-        ]
-
-    def joints(self) -> list[Constraint]:
-        """Upper link fixed to the humerus, hinge, guide."""
-        on_humerus = tuple(self.origin - self.arm.segments["humerus"].origin)
-        return [
-            Fixed(name="cuff", body_i="humerus", body_j=UPPER, point_i=on_humerus),
-            Revolute(name=HINGE, body_i=UPPER, body_j=LOWER, point_j=(0.0, 0.0, 0.0), axis_j=(0.0, 0.0, 1.0)),
-            self._guide(),
-        ]
-
-    def _guide(self) -> Constraint:
-        """Lower link and a point of the forearm on its long axis, seen across the elbow axis."""
-        at = (0.0, -self.device.guide_distance, 0.0)
-        if self.guide_kind == "plane":
-            across, point = (1.0, 0.0, 0.0), tuple(self.axes @ at)
-            return PlaneGuide(name=GUIDE, body_i=LOWER, body_j="forearm", normal_i=across, point_i=at, point_j=point)
-        kind = LineGuide if self.guide_kind == "line" else Slider
-        return kind(name=GUIDE, body_i=LOWER, body_j="forearm", axis_i=(0.0, 1.0, 0.0), point_i=at)
-
-    def forces(
-        self, reference: str, authority: str, offset: str | None = None, *, start_tension: float | None = None
-    ) -> list[Force]:
-        """Hinge friction, controller, motors and ropes.
-
-        Args:
-            reference: name of the input psi(t) [rad].
-            authority: name of the input that scales the controller's command, 0 to 1 [-].
-            offset: coordinate added to the reference [rad], such as a filtered setpoint.
-            start_tension: of the agonist [N]; None: that of a command without error.
-        """
-        d = self.device
-        forces: list[Force] = [
-            JointSpringDamper(name="hinge_friction", joint=HINGE, damping=d.hinge_damping),
-            Pid(name=PID, joint=HINGE, reference=reference, offset=offset, drift_gain=d.drift_gain, **dict(d.gains)),
-        ]
-        sides: tuple[tuple[RopeName, Literal[1, -1], float | None], ...] = (
-            (AGONIST, 1, start_tension),
-            (ANTAGONIST, -1, None),
-        )
-        for name, sign, start in sides:
-            rope: Rope = getattr(d, name)
-            motor = RopeActuator(
-                name=f"{name}_motor", pid=PID, sign=sign, authority=authority, start_tension=start, **dict(d.actuator)
-            )
-            path = (PathPoint(body=UPPER, point=rope.upper), PathPoint(body=LOWER, point=rope.lower))
-            forces += [motor, RopeForce(name=name, path=path, coordinate=f"{motor.name}.tension")]
-        return forces

@@ -10,17 +10,19 @@ import math
 import numpy as np
 from pydantic import Field
 
+from dms_core.bracket import narrowed, trial
 from dms_core.errors import InputError
 from dms_core.model import GROUND, JointSpringDamper, PathPoint, Revolute, RigidBody, RopeLength, Slider
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.geometry.frames import quaternion
-from dms_core.model.geometry.rotations import dot, sub
+from dms_core.model.geometry.rotations import cross, dot, scale, sub, turned
 from exo_env.ecosystem.arm import Arm
 from exo_env.jit import compiled
 from exo_env.settings import Settings
-from exo_env.world.rest_pose import handle_angle
 
 HANDLE, WEIGHT, ROPE, GRIP_JOINT = "handle", "weight", "gym_rope", "grip"
+MOST_TRIALS = 200
+"""Trials of the handle's angle; its bracket is empty long before."""
 
 
 class Handle(Settings):
@@ -41,6 +43,42 @@ class GymMachine(Settings):
     high_pulley: Vector = Field(description="in ground axes [m]; the weight hangs below it")
     weight_start: float = Field(description="height of the weight at the start [m]")
     weight_inertia: float = Field(gt=0.0, description="inertia over mass of the weight [m^2]")
+
+
+@compiled
+def _handle_moment(axis, gravity, to_pulley, handle, weight, angle):
+    """Moment about the grip that turns the handle back [Nm]: of the rope and of its own weight."""
+    down = turned(axis, math.cos(angle), math.sin(angle), (0.0, -1.0, 0.0))
+    length = handle[1]
+    pull = sub(to_pulley, scale(length, down))
+    tension = weight * math.sqrt(dot(gravity, gravity)) / math.sqrt(dot(pull, pull))
+    return -(length * tension * dot(axis, cross(down, pull)) + handle[0] * handle[2] * dot(axis, cross(down, gravity)))
+
+
+@compiled
+def handle_angle(axis, gravity, to_pulley, handle, weight):
+    """Angle about the elbow axis, from hanging straight down, at which the handle rests [rad].
+
+    The rope pulls with the weight's force, the handle has its own, and the grip turns freely.
+
+    Args:
+        axis: of the elbow, a triple.
+        gravity: a triple [m/s^2].
+        to_pulley: from the grip to the low pulley, a triple [m].
+        handle: mass [kg], length [m], distance of the centre of mass from the grip [m].
+        weight: mass on the rope [kg].
+    """
+    about = math.atan2(to_pulley[0], -to_pulley[1])
+    low, high, moved = about - 1.5, about + 1.5, 0.0
+    f_low = _handle_moment(axis, gravity, to_pulley, handle, weight, low)
+    f_high = _handle_moment(axis, gravity, to_pulley, handle, weight, high)
+    for _ in range(MOST_TRIALS):
+        x = trial(low, f_low, high, f_high)
+        if not low < x < high:
+            break
+        f = _handle_moment(axis, gravity, to_pulley, handle, weight, x)
+        low, f_low, high, f_high, moved = narrowed(low, f_low, high, f_high, moved, x, f)
+    return 0.5 * (low + high)
 
 
 @compiled

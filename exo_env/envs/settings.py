@@ -1,16 +1,23 @@
-"""Settings of the environment from what a user may give."""
+"""The arguments of an environment, and what is made of them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
+from dms_core.yaml_text import read_yaml
 from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.subject import DEFAULT
+from exo_env.ecosystem.worn_exoskeleton import Misalignment
 from exo_env.patient.distributions import Distribution, distribution
+from exo_env.settings import Settings
 
 LEAST_LOAD, MOST_LOAD = 0.05, 50.0
 """Weights that the machine takes [kg]."""
@@ -18,34 +25,132 @@ SOLVER_OPTIONS: dict[str, Any] = {"method": "sdirk2", "newton_tol": 0.2, "h_min"
 """A run that needs smaller steps [s], or more of them in an episode, has failed. Newton's method may leave a fifth of
 the largest error of a step; with a twentieth, the default elsewhere, the elbow of 12 patients came no nearer to runs at
 rtol 1e-6, in a third to a half more iterations."""
-TIME = 6.0
-"""Of one repetition [s]."""
+DEFAULT_LOAD = {"uniform": [0.5, 2.0]}
+"""Weight on the machine [kg]; assumed."""
+MOST_CYCLE = 100_000
+
+
+class EnvSettings(Settings):
+    """The arguments that every environment takes; all are JSON."""
+
+    patient: Any = Field(default="mixed", description="population by name or YAML file; fields of one, or of a patient")
+    load: Any = Field(default=None, description="weight [kg], or a distribution")
+    exoskeleton: Any = Field(default=None, description="device by name or YAML file, or changes of the default one")
+    misalignment: Any = Field(default=None, description="how the device is worn: shift [m] and tilt_deg of the hinge")
+    subject: str = Field(default=DEFAULT, description="anatomy by name or YAML file")
+    reference: Any = Field(default=None, description="changes of the movement's distributions")
+    action_mode: str = Field(default="rope_tension", description="drive, by name")
+    drive_settings: Any = Field(default=None, description="changes of the drive's settings")
+    observation: Any = Field(default=("device",), description="groups or channels, in order")
+    noise: Any = Field(default=True, description="False, or a channel's deviation, delay and quantum")
+    reward_weights: Any = Field(default=None, description="changes of the terms' weights")
+    limits: Any = Field(default=None, description="changes of what ends an episode")
+    control_rate: Any = Field(default=50.0, description="[Hz]")
+    episode_duration: Any = Field(default=None, description="[s]")
+    cycle: Any = Field(default=None, description="number of different episodes, after which the first comes again")
+    rtol: Any = Field(default=None, description="of the solver; None: that of the drive")
+    render_mode: Literal["human", "rgb_array"] | None = None
 
 
 def within(value: Any, low: float, high: float) -> bool:
     """Whether a value is a number between two limits."""
-    return isinstance(value, int | float | np.number) and bool(low <= value <= high)
+    return (
+        isinstance(value, int | float | np.number)
+        and not isinstance(value, bool | np.bool_)
+        and bool(low <= value <= high)
+    )
+
+
+def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> None:
+    """Refuses what is no number between two limits.
+
+    Raises:
+        InputError: names the argument and its value.
+    """
+    if not within(value, low, high):
+        raise InputError(f"{name} = {value!r}: expected a number from {low:g} to {high:g}{unit and ' ' + unit}.")
+
+
+def check_whole(name: str, value: Any, most: int) -> None:
+    """Refuses what is no whole number from 1 to `most`.
+
+    Raises:
+        InputError: names the argument and its value.
+    """
+    if type(value) is not int or not 1 <= value <= most:
+        raise InputError(f"{name} = {value!r}: expected a whole number from 1 to {most}.")
+
+
+def control_steps(duration: float, rate: float) -> int:
+    """Control periods of an episode.
+
+    Raises:
+        InputError: there is not one.
+    """
+    steps = round(duration * rate)
+    if steps < 1:
+        raise InputError(
+            f"episode_duration = {duration:g} s at control_rate = {rate:g} Hz is less than one control period; "
+            f"expected at least {1.0 / rate:g} s."
+        )
+    return steps
 
 
 def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:
     """Distribution of the weight on the machine [kg]."""
-    spec = {"uniform": [0.5, 2.0]} if load is None else load
+    spec = DEFAULT_LOAD if load is None else load
+    right = f"expected a number from {LEAST_LOAD} to {MOST_LOAD} kg, or a distribution of such numbers"
     try:
-        if isinstance(spec, float) and not np.isfinite(spec):
-            raise InputError(f"a number from {LEAST_LOAD} to {MOST_LOAD} kg is wanted.")
+        if isinstance(spec, float) and not math.isfinite(spec):
+            raise InputError(f"{right}.")
         found = distribution(spec)
         if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in found.limits()):
-            raise InputError(f"numbers from {LEAST_LOAD} to {MOST_LOAD} kg are wanted.")
+            raise InputError(f"{right}.")
     except InputError as error:
         raise InputError(f"load = {load!r}: {error}") from None
     return found
 
 
-def worn_device(source: str | Mapping[str, Any] | None) -> Exoskeleton:
-    """A shipped device by name, or the default with some values changed."""
+def worn_device(source: Any) -> Exoskeleton:
+    """A device: a shipped one by name, a YAML file, or the default with some values changed, deep inside too.
+
+    Raises:
+        InputError: it is none of these, or a value is wrong.
+    """
     shipped = sorted(p.stem for p in (configs() / "exoskeletons").glob("*.yaml"))
     if source is None or isinstance(source, Mapping):
-        return Exoskeleton.from_config("exoskeletons/elbow.yaml").changed(**(source or {}))
+        try:
+            return Exoskeleton.from_config("exoskeletons/elbow.yaml").changed(**(source or {}))
+        except InputError as error:
+            raise InputError(f"exoskeleton: {error}") from None
+    if isinstance(source, str) and source.endswith((".yaml", ".yml")):
+        return read_device(source)
     if source not in shipped:
-        raise InputError(f"exoskeleton = {source!r}; a mapping or one of {choices(shipped)} is wanted.")
+        raise InputError(
+            f"exoskeleton = {source!r}: expected one of {choices(shipped)}, a YAML file, or a mapping of changes of "
+            "the default device."
+        )
     return Exoskeleton.from_config(f"exoskeletons/{source}.yaml")
+
+
+def read_device(path: str | Path) -> Exoskeleton:
+    """A device from a YAML file; configs/exoskeletons/elbow.yaml shows every key.
+
+    Raises:
+        InputError: the file is missing or wrong; names file, key and value.
+    """
+    try:
+        return Exoskeleton(**read_yaml(path))
+    except InputError as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+
+
+def worn_misalignment(source: Any) -> Misalignment:
+    """How the device is worn.
+
+    Raises:
+        InputError: it is no mapping with some of `shift` and `tilt_deg`.
+    """
+    if not (source is None or isinstance(source, Mapping)):
+        raise InputError(f"misalignment = {source!r}: expected a mapping with some of shift, tilt_deg, or None.")
+    return Misalignment(**(source or {}))

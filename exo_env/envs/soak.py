@@ -39,7 +39,7 @@ def soak(
     begin = time.perf_counter()
     for k in range(steps):
         before = time.perf_counter()
-        observation, reward, terminated, truncated, info = env.step(actions.uniform(-1.0, 1.0, 2))
+        observation, reward, terminated, truncated, info = env.step(actions.uniform(-1.0, 1.0, env.action_space.shape))
         worst["step_ms"] = max(worst["step_ms"], 1e3 * (time.perf_counter() - before))
         bad += not (np.isfinite(observation).all() and np.isfinite(reward) and observation in env.observation_space)
         if info["solver_failed"]:

@@ -1,44 +1,49 @@
-"""The vector environment as a VecEnv of Stable-Baselines3; the only module here that needs that library."""
+"""Many environments in a compiled batch as a VecEnv of Stable-Baselines3; the only module that needs that library."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
 from dms_core.errors import InputError
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
+from exo_env.envs.vector_env import AssistanceVectorEnv
 
 
-class ElbowLiftVecEnv(VecEnv):
-    """N worlds that reset by themselves; infos of an ended episode have what SB3 looks for.
+class AssistanceVecEnv(VecEnv):
+    """N worlds that reset by themselves; infos of an ended episode have what Stable-Baselines3 looks for.
 
     `terminal_observation` is the last observation, and `TimeLimit.truncated` tells an episode that time ended from one
-    that an event did, so that value estimates bootstrap where they should. An ended episode's time, effort and
-    solver_failed are in it too.
+    that an event did, so that value estimates bootstrap where they should. An ended episode's time, what the task
+    tells, and solver_failed are in it too.
 
     Args:
+        vector_type: class of the batch, such as ElbowLiftVectorEnv.
         num_envs: number of worlds.
         threads: that step them; None takes one for each core.
-        settings: of ElbowLiftEnv.
+        settings: of the environment.
     """
 
-    def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:
-        self.worlds = ElbowLiftVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **settings)
+    def __init__(
+        self, vector_type: type[AssistanceVectorEnv], num_envs: int, *, threads: int | None = None, **settings: Any
+    ) -> None:
+        self.worlds = vector_type(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **settings)
         self.render_mode = self.worlds.render_mode
         self.metadata = self.worlds.metadata
         super().__init__(num_envs, self.worlds.single_observation_space, self.worlds.single_action_space)
         self._actions: np.ndarray | None = None
 
     def reset(self) -> np.ndarray:
-        """First observations, shape (num_envs, n); seeds are those of `seed`."""
-        if any(self._options):
-            raise InputError("set_options is not supported; give patient, load and reference as settings.")
-        seeds = [s for s in self._seeds if s is not None]
-        found, _ = self.worlds.reset(seed=seeds if len(seeds) == self.num_envs else None)
+        """First observations, shape (num_envs, n), with the seeds of `seed` and the options of `set_options`.
+
+        Both hold for this reset, as everywhere in Stable-Baselines3; `env_method("set_reset_options", {...})` gives
+        options of the automatic resets behind an episode's end.
+        """
+        found, _ = self.worlds.reset_each(self._seeds, self._options)
         self._reset_seeds()
         self._reset_options()
         return found
@@ -54,8 +59,8 @@ class ElbowLiftVecEnv(VecEnv):
         over = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(over):
-            final = {name: told["final_info"][name][i] for name in ("time", "effort", "solver_failed")}
-            infos[i] = final | {
+            final = {name: x for name, x in told["final_info"].items() if not name.startswith("_")}
+            infos[i] = {name: x[i] for name, x in final.items() if isinstance(x, np.ndarray) and name != "event"} | {
                 "terminal_observation": told["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
             }
@@ -74,9 +79,19 @@ class ElbowLiftVecEnv(VecEnv):
         return [getattr(self.worlds.envs[i], attr_name) for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: None | int | Iterable[int] = None) -> None:
-        """Set an attribute of some worlds."""
-        for i in self._get_indices(indices):
-            setattr(self.worlds.envs[i], attr_name, value)
+        """Set an attribute of some worlds.
+
+        Raises:
+            InputError: it is a setting, from which the environment was made; says what to do instead.
+        """
+        envs = [self.worlds.envs[i] for i in self._get_indices(indices)]
+        if attr_name in (*self.worlds.env_type.settings_type.model_fields, *MADE):
+            raise InputError(
+                f"'{attr_name}' cannot be set from outside: the environments were made with it. Give it when they are "
+                "made, or, for patient, load, reference and initial_angle_deg, to set_options."
+            )
+        for env in envs:
+            setattr(env, attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: None | int | Iterable[int] = None, **method_kwargs: Any
@@ -89,3 +104,22 @@ class ElbowLiftVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: None | int | Iterable[int] = None) -> list[bool]:
         """Worlds have no wrappers."""
         return [False for _ in self._get_indices(indices)]
+
+
+MADE = ("drive", "task", "ecosystem", "population", "movement", "observer", "period", "duration", "solver")
+"""Attributes of an environment that follow from its settings."""
+
+
+class ElbowLiftVecEnv(AssistanceVecEnv):
+    """Many ElbowLiftEnv for Stable-Baselines3.
+
+    Args:
+        num_envs: number of worlds.
+        threads: that step them; None takes one for each core.
+        settings: of ElbowLiftEnv.
+    """
+
+    vector_type: ClassVar[type[AssistanceVectorEnv]] = ElbowLiftVectorEnv
+
+    def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:
+        super().__init__(ElbowLiftVectorEnv, num_envs, threads=threads, **settings)

@@ -1,10 +1,10 @@
-"""The vector environment: gymnasium.make_vec("exo_env:exo/ElbowLift-v0", num_envs=N)."""
+"""Many environments of one kind in a compiled batch: gymnasium.make_vec("exo_env:exo/ElbowLift-v1", num_envs=N)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -12,32 +12,35 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from dms_core.errors import InputError, choices
-from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.limits import NOTHING, SOLVER
-from exo_env.tasks.rewards import TERMS
-from exo_env.world.batch import NUMBERS, Batch
-from exo_env.world.control_period import STATUS
+from exo_env.envs.base_env import AssistanceEnv
+from exo_env.tasks.channels import first_places
+from exo_env.tasks.task import NOTHING, SOLVER, Task
+from exo_env.world.batch import Batch
 from exo_env.world.episode import Episode
-from exo_env.world.reset import OPEN
+from exo_env.world.reset import BEGUN
+from exo_env.world.tables import STATUS
 
 EPISODE = attrgetter("_episode")
 """Of an environment, None where there is none: cheaper than the property, which raises."""
-AT = {name: k for k, name in enumerate(NUMBERS)}
 
 
-class ElbowLiftVectorEnv(VectorEnv):
-    """Many ElbowLiftEnv that compiled code steps in parallel, each the same to the last bit as alone.
+class AssistanceVectorEnv(VectorEnv):
+    """Many environments that compiled code steps in parallel, each the same to the last bit as alone.
+
+    A subclass names the environment as `env_type`.
 
     Args:
         num_envs: number of worlds.
         autoreset_mode: of gymnasium.vector.AutoresetMode: at the step after an episode's end (default), at the same
             step, or never.
         threads: that step the worlds; None takes one for each core.
-        settings: of ElbowLiftEnv.
+        settings: of the environment.
 
     Raises:
         InputError: a setting is not usable.
     """
+
+    env_type: ClassVar[type[AssistanceEnv]]
 
     def __init__(
         self,
@@ -48,29 +51,30 @@ class ElbowLiftVectorEnv(VectorEnv):
         **settings: Any,
     ) -> None:
         if not (isinstance(num_envs, int | np.integer) and num_envs >= 1):
-            raise InputError(f"num_envs = {num_envs!r}; a whole number from 1 is wanted.")
+            raise InputError(f"num_envs = {num_envs!r}: expected a whole number from 1.")
         if threads is not None and not (isinstance(threads, int) and threads >= 1):
-            raise InputError(f"threads = {threads!r}; a whole number from 1 is wanted, or None.")
+            raise InputError(f"threads = {threads!r}: expected a whole number from 1, or None.")
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in [*AutoresetMode, *modes]:
-            raise InputError(f"autoreset_mode = {autoreset_mode!r}; one of {choices(modes)} is wanted.")
+            raise InputError(f"autoreset_mode = {autoreset_mode!r}: expected one of {choices(modes)}.")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.num_envs = int(num_envs)
-        self.envs = [ElbowLiftEnv(**settings) for _ in range(self.num_envs)]
+        self.envs = [self.env_type(**settings) for _ in range(self.num_envs)]
         one = self.envs[0]
         self.render_mode = one.render_mode
         self.metadata = {**one.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space, self.single_action_space = one.observation_space, one.action_space
         self.observation_space = batch_space(one.observation_space, self.num_envs)
         self.action_space = batch_space(one.action_space, self.num_envs)
-        self._batch = Batch(self.num_envs, one.observer.size, threads)
+        self._task: Task = one.task
+        self._batch = Batch(self.num_envs, one.observer.size, len(one.task.terms), _told_places(one.task), threads)
         self._over = np.ones(self.num_envs, bool)
         self._episodes: list[Episode | None] = [None] * self.num_envs
         self._started = False
 
     @property
     def observation_structure(self) -> tuple:
-        """As ElbowLiftEnv.observation_structure."""
+        """As that of one environment."""
         return self.envs[0].observation_structure
 
     def reset(
@@ -80,28 +84,39 @@ class ElbowLiftVectorEnv(VectorEnv):
 
         Args:
             seed: of the first world, one more for each further one; or one a world.
-            options: of ElbowLiftEnv.reset, and 'reset_mask', booleans of shape (num_envs,).
+            options: of the environment's reset, and 'reset_mask', booleans of shape (num_envs,).
 
         Raises:
             InputError: seeds or mask do not fit, or an option is not usable.
         """
         if not isinstance(options, dict | None):
-            raise InputError(f"options = {options!r}; one mapping for all worlds is wanted, or None.")
+            raise InputError(f"options = {options!r}: expected one mapping for all worlds, or None.")
         options = dict(options or {})
         mask = self._mask(options.pop("reset_mask", None))
-        seeds = self._seeds(seed)
+        return self.reset_each(self._seeds(seed), [options] * self.num_envs, mask)
+
+    def reset_each(
+        self, seeds: Sequence[int | None], options: Sequence[dict[str, Any]], mask: np.ndarray | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """As `reset`, with a seed and options for each world, shape (num_envs,); `mask`: those that are reset."""
+        where = np.ones(self.num_envs, bool) if mask is None else mask
         # A reset that fails half-way leaves nothing to step.
-        self._over[mask], self._started = True, False
-        infos = self._begin(mask, {}, seeds, options)
+        self._over[where], self._started = True, False
+        infos = self._begin(where, {}, seeds, options)
         self._started = True
         return self._batch.observations.copy(), infos
+
+    def set_reset_options(self, options: dict[str, Any] | None) -> None:
+        """Options of every reset from now on, automatic ones included; see AssistanceEnv.set_reset_options."""
+        for env in self.envs:
+            env.set_reset_options(options)
 
     def _mask(self, mask: Any) -> np.ndarray:
         """Worlds to reset."""
         if mask is None:
             return np.ones(self.num_envs, bool)
         if not (isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
-            raise InputError(f"reset_mask = {mask!r}; {self.num_envs} booleans, one of them true, are wanted.")
+            raise InputError(f"reset_mask = {mask!r}: expected {self.num_envs} booleans, one of them true.")
         if not self._started and not mask.all():
             raise gymnasium.error.ResetNeeded("The first reset() has to reset all worlds.")
         return mask
@@ -113,7 +128,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         if isinstance(seed, int | np.integer):
             return [int(seed) + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
-            raise InputError(f"{len(seed)} seeds for {self.num_envs} worlds; one seed, or one a world, is wanted.")
+            raise InputError(f"{len(seed)} seeds for {self.num_envs} worlds: expected one seed, or one a world.")
         return list(seed)
 
     def _begin(
@@ -121,17 +136,17 @@ class ElbowLiftVectorEnv(VectorEnv):
         where: np.ndarray,
         infos: dict[str, Any],
         seeds: Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        options: Sequence[dict[str, Any]] | None = None,
     ) -> dict[str, Any]:
-        """New episodes in the worlds `where`, shape (num_envs,), opened on all threads; gives the infos with theirs."""
+        """New episodes in the worlds `where`, shape (num_envs,), begun on all threads; gives the infos with theirs."""
         which = np.flatnonzero(where)
         for i in which.tolist():
             env = self.envs[i]
-            env.prepare(seeds[i] if seeds else None, options)
-            self._batch.put(i, env.packed, env.rig.setting)
-        for i, code in zip(which.tolist(), self._batch.open(which).tolist(), strict=True):
-            self.envs[i].opened(code)
-            if code != OPEN:
+            env.prepare(seeds[i] if seeds else None, options[i] if options else None)
+            self._batch.put(i, env.packed)
+        for i, code in zip(which.tolist(), self._batch.begin(which).tolist(), strict=True):
+            self.envs[i].begun(code)
+            if code != BEGUN:
                 self._take_over(i)
             self._episodes[i], self._over[i] = self.envs[i].episode, False
             infos = self._add_info(infos, self.envs[i].start_info(), i)
@@ -139,14 +154,14 @@ class ElbowLiftVectorEnv(VectorEnv):
 
     def _take_over(self, i: int) -> None:
         """World i from its environment, which has ordered its equations anew."""
-        self._batch.put(i, self.envs[i].packed, self.envs[i].rig.setting)
+        self._batch.put(i, self.envs[i].packed)
         self._batch.take(i)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """A control period of every world.
 
         Args:
-            actions: shape (num_envs, 2); beyond -1 to 1 they are clipped.
+            actions: shape (num_envs, n); beyond -1 to 1 they are clipped.
 
         Raises:
             InputError: the actions have another shape or are not finite.
@@ -168,7 +183,7 @@ class ElbowLiftVectorEnv(VectorEnv):
         status = self._batch.status
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
         terminated = running & (status[:, STATUS.event] != NOTHING)
-        truncated = running & (status[:, STATUS.step] == status[:, STATUS.steps])
+        truncated = running & (status[:, STATUS.step] == self.envs[0].steps)
         infos = self._infos(running) if running.any() else {}
         self._over = ~running | terminated | truncated
         infos = self._begin(~running, infos)
@@ -180,42 +195,42 @@ class ElbowLiftVectorEnv(VectorEnv):
     def _checked(self, actions: Any) -> np.ndarray:
         """Finite actions within the box."""
         used = np.asarray(actions, float)
-        if used.shape != (self.num_envs, 2):
-            raise InputError(f"actions have shape {used.shape}; ({self.num_envs}, 2) is wanted.")
+        if used.shape != self.action_space.shape:
+            raise InputError(f"actions have shape {used.shape}: expected {self.action_space.shape}.")
         if not np.isfinite(used).all():
             i = int(np.flatnonzero(~np.isfinite(used).all(axis=1))[0])
-            raise InputError(f"actions[{i}] = {used[i].tolist()}; finite numbers are wanted.")
+            raise InputError(f"actions[{i}] = {used[i].tolist()}: expected finite numbers.")
         return np.clip(used, -1.0, 1.0)
 
     def _same_step(self, ended: np.ndarray, told: dict[str, Any]) -> dict[str, Any]:
         """Begin the episodes of worlds that ended one now; what they ended with is in final_obs and final_info."""
         last, infos = self._batch.observations.copy(), self._infos(~ended) if not ended.all() else {}
+        plain = ("time", *(number.name for number in self._task.told), "solver_failed")
         for i in np.flatnonzero(ended).tolist():
-            final = {name: told[name][i].item() for name in _PLAIN}
-            final |= {group: {name: told[group][name][i].item() for name in TERMS} for group in _GROUPED}
+            final = {name: told[name][i].item() for name in plain}
+            final |= {group: {name: told[group][name][i].item() for name in self._task.terms} for group in GROUPED}
             if "event" in told and told["_event"][i]:
                 final["event"] = told["event"][i]
             infos = self._add_info(infos, {"final_obs": last[i], "final_info": final}, i)
         return self._begin(ended, infos)
 
     def _infos(self, running: np.ndarray) -> dict[str, Any]:
-        """Of a step, as gymnasium's own vector environments give it: arrays, and masks of where they hold."""
-        numbers, status, env = self._batch.numbers, self._batch.status, self.envs[0]
+        """Infos of a step as Gymnasium's own vector environments give them: arrays, and masks of where they hold."""
+        numbers, status, task = self._batch.numbers, self._batch.status, self._task
+        terms, told = numbers[:, 1 : 1 + len(task.terms)].T, numbers[:, 1 + len(task.terms) :].T
 
-        def column(name: str) -> np.ndarray:
-            return np.where(running, numbers[:, AT[name]], 0.0)
+        def where(column: np.ndarray) -> np.ndarray:
+            return np.where(running, column, 0.0)
 
-        failed = running & (status[:, STATUS.event] == SOLVER)
-        weights = {name: np.where(running, w, 0.0) for name, w in env.weights.model_dump().items()}
+        values = {name: where(column) for name, column in zip(task.terms, terms, strict=True)}
+        weights = {name: where(np.full(self.num_envs, w)) for name, w in task.weights.model_dump().items()}
+        masks = {f"_{name}": running.copy() for name in task.terms}
         infos: dict[str, Any] = {
-            "reward_terms": {name: column(name) for name in TERMS} | {f"_{name}": running.copy() for name in TERMS},
-            "reward_weights": weights | {f"_{name}": running.copy() for name in TERMS},
-            "time": column("time") * env.period,
-            "tracking_error_deg": np.degrees(column("tracking_error")),
-            "device_share": column("device_share"),
-            "effort": column("effort"),
-            "elbow_reaction": column("elbow_reaction"),
-            "solver_failed": failed,
+            "reward_terms": values | masks,
+            "reward_weights": weights | {name: mask.copy() for name, mask in masks.items()},
+            "time": where(status[:, STATUS.step] * self.envs[0].period),
+            **{number.name: where(number.factor * column) for number, column in zip(task.told, told, strict=True)},
+            "solver_failed": running & (status[:, STATUS.event] == SOLVER),
         }
         infos |= {f"_{name}": running.copy() for name in list(infos)}
         for i in np.flatnonzero(running & (status[:, STATUS.event] != NOTHING)).tolist():
@@ -228,7 +243,7 @@ class ElbowLiftVectorEnv(VectorEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         """Refused: the worlds are addresses of this process."""
-        raise TypeError("ElbowLiftVectorEnv cannot be copied or pickled; make another one of the same settings.")
+        raise TypeError(f"{type(self).__name__} cannot be copied or pickled; make another one of the same settings.")
 
     def close_extras(self, **kwargs: Any) -> None:
         """End threads and windows."""
@@ -237,7 +252,11 @@ class ElbowLiftVectorEnv(VectorEnv):
             env.close()
 
 
-_PLAIN = ("time", "tracking_error_deg", "device_share", "effort", "elbow_reaction", "solver_failed")
-"""Infos of a step that are one number a world."""
-_GROUPED = ("reward_terms", "reward_weights")
+GROUPED = ("reward_terms", "reward_weights")
 """Infos of a step that are one number a world and term."""
+
+
+def _told_places(task: Task) -> np.ndarray:
+    """Place of each reading that infos tell."""
+    names, first = [reading.name for reading in task.readings], first_places(task.readings)
+    return np.array([first[names.index(number.reading)] for number in task.told], np.int64)

@@ -33,7 +33,7 @@ from dms_core.model.control.ziegler_nichols import (
     ziegler_nichols,
 )
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.ecosystem.exoskeleton import AGONIST, Exoskeleton, PidGains
+from exo_env.ecosystem.exoskeleton import Exoskeleton
 
 START = radians(60.0)
 """Elbow angle at which the step begins [rad]: the middle of the exercise."""
@@ -75,7 +75,7 @@ class StepExperiment:
         self.holding = PROBE * slow / (slow - fast)
 
     def _ecosystem(self, gains: Gains) -> Ecosystem:
-        pid = PidGains(kp=gains.kp, ki=gains.ki, kd=gains.kd)
+        pid = {"kp": gains.kp, "ki": gains.ki, "kd": gains.kd}
         return Ecosystem(device=self.device.changed(gains=pid), machine=None)
 
     def _acceleration(self, tension: float) -> float:
@@ -126,7 +126,7 @@ def tune(device: Exoskeleton, progress: Callable[[float, float], None] | None = 
 
 def what_limits(device: Exoskeleton, Kc: float) -> str:
     """A sentence."""
-    lag, moment_arm = device.actuator.time_constant, device.moment_arm(AGONIST, START)
+    lag, moment_arm = device.actuator.time_constant, device.moment_arm(device.lifting_rope, START)
     return (
         f"the motors' first-order lag of {1e3 * lag:g} ms: Kc times the rope's moment arm of {1e3 * moment_arm:.1f} mm "
         f"is {Kc * moment_arm:.0f} Nm/rad, the hinge's damping over the lag {device.hinge_damping / lag:.0f} Nm/rad, "

@@ -21,9 +21,8 @@ import numpy as np
 
 from dms_core.model.geometry.rotations import dot, vec
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.ecosystem.exoskeleton import Exoskeleton, link_moment
+from exo_env.ecosystem.exoskeleton import link_moment
 from exo_env.jit import compiled
-from exo_env.patient.effort import SIGN, N
 from exo_env.patient.motor_command import InternalModel
 from exo_env.patient.patient import PATIENT, Patient
 from exo_env.patient.static_optimisation import muscle_moment, needed_moment
@@ -38,12 +37,12 @@ SMALLEST_SCALE = 1.0
 
 @compiled
 def voluntary(patient, arm, angle):
-    """Largest static elbow moment that a patient (numbers as PATIENT) can want at an angle [rad] [Nm]."""
+    """Largest static elbow moment [Nm] that a patient, a row of numbers, can want at an angle [rad]."""
     rested = 1.0 - patient[PATIENT.fatigued_at_start]
     flexors, extensors = patient[PATIENT.maximum_activation_flexors], patient[PATIENT.maximum_activation_extensors]
-    against, given = min(patient[PATIENT.co_contraction] * flexors, extensors * rested), np.empty(N)
-    for i in range(N):
-        given[i] = max(flexors * rested if SIGN[i] > 0.0 else against, MINIMUM)
+    against, given = min(patient[PATIENT.co_contraction] * flexors, extensors * rested), np.empty(arm.sign.shape[0])
+    for i in range(given.shape[0]):
+        given[i] = max(flexors * rested if arm.sign[i] > 0.0 else against, MINIMUM)
     return muscle_moment(arm, angle, given)
 
 
@@ -68,7 +67,7 @@ def put_lacking(patient, arm, load, link, course, lacking):
 
 def voluntary_moment(patient: Patient, known: InternalModel, angle: float = MIDDLE) -> float:
     """Largest static elbow moment that the patient can want [Nm]."""
-    return voluntary(patient.numbers(), known.arm, angle)
+    return voluntary(patient.row(), known.arm, angle)
 
 
 def ability(patient: Patient, known: InternalModel) -> float:
@@ -78,7 +77,7 @@ def ability(patient: Patient, known: InternalModel) -> float:
         patient: who.
         known: arm, machine and real weight.
     """
-    return able(patient.numbers(), known.arm, known.load)
+    return able(patient.row(), known.arm, known.load)
 
 
 @dataclass(frozen=True)
@@ -91,19 +90,3 @@ class Need:
     """M_lack at each control time [Nm], shape (n,)."""
     scale: float
     """Mean of M_need over the episode, at least 1 Nm [Nm]."""
-
-    @classmethod
-    def of(cls, patient: Patient, known: InternalModel, device: Exoskeleton, course: np.ndarray) -> Need:
-        """What a movement needs.
-
-        Args:
-            patient: who.
-            known: arm, machine and real weight.
-            device: whose lower link is carried.
-            course: psi [rad], its rate and its acceleration at the control times, shape (n, 3).
-        """
-        lacking = np.zeros(len(course))
-        found, scale = put_lacking(
-            patient.numbers(), known.arm, known.load, device.lower_link.numbers(), np.ascontiguousarray(course), lacking
-        )
-        return cls(found, lacking, scale)

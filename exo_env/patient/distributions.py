@@ -8,13 +8,14 @@ In a file, one of:
     {log_uniform: [0.001, 0.1]}                                      uniform in the logarithm
     {choice: [male, female], weights: [1, 2]}                        one of several; equal weights unless given
 
-Each takes exactly one uniform number from 0 to 1 and returns its quantile, so that a field's spread changes no other.
+A value is the quantile of one uniform number from 0 to 1, which each field takes from a stream of its own (streams.py),
+so that a field's spread changes no other.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from scipy.special import ndtr, ndtri
 from dms_core.errors import InputError, choices
 from exo_env.jit import compiled
 from exo_env.settings import Settings
+from exo_env.streams import normal_quantile, streams, uniforms
 
 Value = float | str
 
@@ -176,38 +178,39 @@ def distribution(spec: Any) -> Distribution:
 
 STRAIGHT, LOGARITHMIC, NORMAL, OTHER = range(4)
 """How a row of `Draws` gives a quantile."""
+LEAST, MOST = 1e-300, 1.0 - 2.0**-53
+"""Probabilities beyond which a normal quantile is not finite."""
 
 
 class Draws:
-    """Several distributions of numbers, drawn from at once.
+    """Several distributions of numbers, each drawn from a stream of its own.
 
     Args:
-        spreads: one for each number.
+        spreads: distribution of each number, by the name of its stream (streams.py).
     """
 
-    def __init__(self, spreads: Sequence[Distribution]) -> None:
-        rows = [_drawing(d) for d in spreads]
+    def __init__(self, spreads: Mapping[str, Distribution]) -> None:
+        rows = [_drawing(d) for d in spreads.values()]
+        self._streams = streams(spreads)
         self._kinds = np.array([kind for kind, _ in rows], np.int64)
-        self._numbers = np.array([numbers for _, numbers in rows], dtype=float)
-        self._others = [(k, d) for k, d in enumerate(spreads) if rows[k][0] == OTHER]
-        self._normal = int((self._kinds == NORMAL).sum())
+        self._numbers = np.array([numbers for _, numbers in rows], dtype=float).reshape(-1, 6)
+        self._others = [(k, d) for k, d in enumerate(spreads.values()) if rows[k][0] == OTHER]
 
-    def sample(self, generator: np.random.Generator) -> np.ndarray:
-        """One number of each, shape (n,), from as many uniform numbers in the same order."""
-        x = generator.random(len(self._kinds))
+    def sample(self, key: np.uint64) -> np.ndarray:
+        """One number of each in the episode of a key, shape (n,)."""
+        x = np.empty(len(self._kinds))
+        uniforms(key, self._streams, x)
         others = [(k, d.quantile(float(x[k]))) for k, d in self._others]
-        normal = np.empty(self._normal)
-        if self._normal:
-            _probabilities(self._kinds, self._numbers, x, normal)
-            ndtri(normal, out=normal)
-        _quantiles(self._kinds, self._numbers, normal, x)
+        _quantiles(self._kinds, self._numbers, x)
         for k, value in others:
             x[k] = value
         return x
 
 
 def _drawing(d: Distribution) -> tuple[int, tuple[float, ...]]:
-    """Kind, and low, high, and what else `_quantiles` wants of it."""
+    """Kind of a distribution, and the numbers that `_quantiles` reads."""
+    if isinstance(d, Constant) and not isinstance(d.constant, str):
+        return STRAIGHT, (d.constant, d.constant, 0.0, 0.0, 0.0, 0.0)
     if isinstance(d, Uniform):
         return STRAIGHT, (*d.uniform, 0.0, 0.0, 0.0, 0.0)
     if isinstance(d, LogUniform):
@@ -221,19 +224,8 @@ def _drawing(d: Distribution) -> tuple[int, tuple[float, ...]]:
 
 
 @compiled
-def _probabilities(kinds, numbers, x, normal):
-    """Fill what the cut leaves of the probabilities of each normal distribution."""
-    i = 0
-    for k in range(x.shape[0]):
-        if kinds[k] == NORMAL:
-            normal[i] = numbers[k, 4] + x[k] * numbers[k, 5]
-            i += 1
-
-
-@compiled
-def _quantiles(kinds, numbers, normal, x):
-    """Probabilities in x become values; normal: standard quantiles of each normal distribution."""
-    i = 0
+def _quantiles(kinds, numbers, x):
+    """Probabilities in x become values; rounding does not leave the limits."""
     for k in range(x.shape[0]):
         low, high = numbers[k, 0], numbers[k, 1]
         if kinds[k] == STRAIGHT:
@@ -241,5 +233,5 @@ def _quantiles(kinds, numbers, normal, x):
         elif kinds[k] == LOGARITHMIC:
             x[k] = min(max(low * math.exp(x[k] * numbers[k, 2]), low), high)
         elif kinds[k] == NORMAL:
-            x[k] = min(max(numbers[k, 2] + numbers[k, 3] * normal[i], low), high)
-            i += 1
+            p = min(max(numbers[k, 4] + x[k] * numbers[k, 5], LEAST), MOST)
+            x[k] = min(max(numbers[k, 2] + numbers[k, 3] * normal_quantile(p), low), high)

@@ -28,7 +28,7 @@ import numpy as np
 from dms_core.errors import InputError, SimulationError
 from dms_core.model import Spline
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.ecosystem.arm import MUSCLES, Arm
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.patient.static_optimisation import ArmTable, LoadTable, muscle_moment, needed_moment, planned
 
@@ -52,22 +52,24 @@ class MotorCommand:
     times: np.ndarray
     """[s], shape (n,)."""
     activations: np.ndarray
-    """Wanted activations before scaling [-], shape (n, 6), in the order of MUSCLES."""
+    """Wanted activations before scaling [-], shape (n, m), in the order of `muscles`."""
     moment: np.ndarray
     """Elbow moment that they are meant to give [Nm], shape (n,)."""
     shortage: float
     """Largest moment that the muscles cannot give even at their limits [Nm]."""
+    muscles: tuple[str, ...]
+    """Names, shape (m,)."""
 
     def excitations(self, maximum: float) -> dict[str, Spline]:
         """Course of each muscle's excitation at a maximum activation of 0 to 1."""
         if not 0.0 <= maximum <= 1.0:
             raise InputError(f"maximum activation = {maximum}; a number from 0 to 1 is wanted.")
         scaled = np.maximum(maximum * self.activations, MINIMUM)
-        return {m: Spline(times=tuple(self.times), values=tuple(scaled[:, k])) for k, m in enumerate(MUSCLES)}
+        return {m: Spline(times=tuple(self.times), values=tuple(scaled[:, k])) for k, m in enumerate(self.muscles)}
 
     def start_activation(self, maximum: float) -> dict[str, float]:
         """Activation of each muscle at the start."""
-        return {m: float(max(maximum * self.activations[0, k], MINIMUM)) for k, m in enumerate(MUSCLES)}
+        return {m: float(max(maximum * self.activations[0, k], MINIMUM)) for k, m in enumerate(self.muscles)}
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ class InternalModel:
 
     arm: ArmTable
     load: LoadTable
+    muscles: tuple[str, ...]
+    """Names, in the order of the arm's table."""
 
     @classmethod
     def of(cls, arm: Arm, machine: GymMachine, expected_load: float) -> InternalModel:
@@ -86,23 +90,24 @@ class InternalModel:
             machine: the gym machine.
             expected_load: mass of the weight that it expects [kg].
         """
-        return cls(arm_table(arm), load_table(arm, machine, expected_load))
+        return cls(arm_table(arm), load_table(arm, machine, expected_load), arm.muscles)
 
     def resting_moment(self, flexion: float) -> float:
         """Moment that must be given about the elbow to hold arm and load at rest [Nm]."""
         return needed_moment(self.arm, self.load, flexion, 0.0, 0.0)
 
     def muscle_moment(self, flexion: float, activations: np.ndarray) -> float:
-        """Moment that the muscles give about the elbow at rest [Nm]; activations [-], shape (6,), at least 0.01."""
+        """Moment that the muscles give about the elbow at rest [Nm]; activations [-], shape (n,), at least 0.01."""
         return muscle_moment(self.arm, flexion, np.asarray(activations, float))
 
 
 def arm_table(arm: Arm) -> ArmTable:
     """The arm for the compiled iteration."""
-    paths = [arm.path(m, welded=True) for m in MUSCLES]
+    paths = [arm.path(m, welded=True) for m in arm.muscles]
     points = [p for path in paths for p in path]
     return ArmTable(
-        muscles=np.array([arm.muscle(m).numbers() for m in MUSCLES]),
+        muscles=np.array([arm.muscle(m).numbers() for m in arm.muscles]),
+        sign=arm.signs,
         first=np.cumsum([0, *(len(path) for path in paths)]),
         moving=np.array([p.body == "forearm" for p in points]),
         points=np.array([p.point for p in points]),
@@ -149,14 +154,14 @@ def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> 
     Raises:
         SimulationError: the iteration between tendon strain and activation does not settle.
     """
-    moment, activations = np.zeros(len(times)), np.zeros((len(times), len(MUSCLES)))
+    moment, activations = np.zeros(len(times)), np.zeros((len(times), len(model.muscles)))
     shortage, left = planned(
         model.arm, model.load, float(times[1] - times[0]), np.ascontiguousarray(course, dtype=float),
         SWEEPS, RELAXATION, SETTLED, moment, activations,
     )  # fmt: skip
     if not left < SETTLED:
         raise unsettled(left, float(times[-1]))
-    return MotorCommand(times, activations, moment, shortage)
+    return MotorCommand(times, activations, moment, shortage, model.muscles)
 
 
 def unsettled(left: float, duration: float) -> SimulationError:

@@ -5,11 +5,19 @@
       maximum_activation_flexors: {uniform: [0.5, 0.9]}
       ...
 
+    title: as the mildly affected, but older
+    base: stroke_mild
+    fields:
+      strength: {uniform: [0.4, 0.7]}
+
     title: everybody
     mixture: {healthy: 1, stroke_mild: 3}
 
+    strength: 0.7                      one patient: a file of values alone, without `fields`; the rest is healthy
+
 A population with `fields` gives every field of a patient, so that nothing is left to a default unseen, unless it names
-another as `base` that gives the rest. `body_mass_index` [kg/m^2] may stand in place of body_mass: heavy and tall go
+a `base`: another shipped population, from which it takes the fields that it does not give. Traits whose default changes
+nothing may be left out (traits.py). `body_mass_index` [kg/m^2] may stand in place of body_mass: heavy and tall go
 together. Otherwise fields are independent (assumed); what goes together is put into populations of its own, and mixed.
 """
 
@@ -26,9 +34,12 @@ from pydantic import Field, model_validator
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from dms_core.yaml_text import read_yaml
+from exo_env.ecosystem.person import SEXES
 from exo_env.patient.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
-from exo_env.patient.patient import FIELDS, SEXES, Patient
+from exo_env.patient.patient import FIELDS, PATIENT, Patient
 from exo_env.settings import Settings
+from exo_env.streams import stream, uniform
+from exo_env.traits import neutral_traits
 
 FOLDER = "patients"
 BODY_MASS_INDEX = "body_mass_index"
@@ -69,13 +80,16 @@ class Population(Settings):
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
-        """A population from a YAML file.
+        """A population from a YAML file; a file of a patient's fields alone is a population of that patient.
 
         Raises:
             InputError: the file is missing or wrong; names file, key and value.
         """
         try:
-            return cls(**read_yaml(path))
+            found = read_yaml(path)
+            if found and not found.keys() & cls.model_fields.keys():
+                return cls(title=Path(path).stem, fields=Patient(**found).model_dump())
+            return cls(**found)
         except InputError as error:
             raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
@@ -102,21 +116,37 @@ class Population(Settings):
             raise InputError(f"base = '{self.base}' is a mixture; a population with fields is wanted.")
         return {k: v for k, v in under.fields_in_full.items() if _patient_field(k) not in here} | self.fields
 
-    def sample(self, generator: np.random.Generator) -> Patient:
-        """A patient. Draws one number for the choice of each mixture and one for each field."""
-        return Patient.of_row(self.draw(generator))
+    def sample(self, source: np.random.Generator | int) -> Patient:
+        """A patient.
 
-    def draw(self, generator: np.random.Generator) -> np.ndarray:
-        """As `sample`, a patient as `Patient.row` gives it; what is checked of a population holds for all of these."""
+        Args:
+            source: a generator, from which one number is taken, or that number: the key of the random streams from
+                which the fields come (streams.py).
+        """
+        key = source.integers(2**63) if isinstance(source, np.random.Generator) else source
+        return Patient.of_row(self.draw(np.uint64(key)))
+
+    def draw(self, key: np.uint64, level: int = 0) -> np.ndarray:
+        """As `sample`, the patient as `Patient.row` gives it; what is checked of a population holds for all of these.
+
+        Args:
+            key: of the episode.
+            level: how many mixtures this population is a part of.
+        """
         if self.mixture:
-            chosen = weighted(self._weights, generator.random())
-            return self.parts[chosen].draw(generator)
+            chosen = weighted(self._weights, uniform(key, stream(f"patient.mixture.{level}"), 0))
+            return self.parts[chosen].draw(key, level + 1)
         draws, places = self._draws
-        row = np.empty(len(FIELDS))
-        row[places] = draws.sample(generator)
+        row = self._defaults.copy()
+        row[places] = draws.sample(key)
         if BODY_MASS_INDEX in self.distributions:
-            row[FIELDS.index("body_mass")] *= row[FIELDS.index("height")] ** 2
+            row[PATIENT.body_mass] *= row[PATIENT.height] ** 2
         return row
+
+    @cached_property
+    def _defaults(self) -> np.ndarray:
+        """Of the traits that are not named."""
+        return Patient().row()
 
     @cached_property
     def _weights(self) -> tuple[float, ...]:
@@ -125,8 +155,8 @@ class Population(Settings):
     @cached_property
     def _draws(self) -> tuple[Draws, np.ndarray]:
         """Distributions as numbers, and the place of each in a patient's row."""
-        places = [FIELDS.index(_patient_field(name)) for name in self.distributions]
-        return Draws([_numeric(d) for d in self.distributions.values()]), np.array(places)
+        fields = {_patient_field(name): _numeric(d) for name, d in self.distributions.items()}
+        return Draws({f"patient.{name}": d for name, d in fields.items()}), np.array([FIELDS.index(x) for x in fields])
 
     def _check_fields(self) -> None:
         """Every field given once, and possible at the ends of its distribution.
@@ -141,9 +171,15 @@ class Population(Settings):
         if {BODY_MASS_INDEX, "body_mass"} <= self.fields.keys():
             raise InputError(f"fields: body_mass and {BODY_MASS_INDEX} are both given; one of them is wanted.")
         found = self.distributions
-        missing = [name for name in Patient.model_fields if name not in map(_patient_field, found)]
+        given = {*map(_patient_field, found), *neutral_traits(Patient)}
+        missing = [name for name in Patient.model_fields if name not in given]
         if missing:
-            raise InputError(f"fields: missing {', '.join(missing)}; give a distribution of each, or a base.")
+            with_fields = [name for name in shipped_populations() if "mixture" not in read_shipped(name)]
+            raise InputError(
+                f"fields: {', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing. Give a distribution of "
+                "each, or name the shipped population that gives what is missing, with a line such as 'base: healthy' "
+                f"(there are {choices(with_fields)}). A file of one patient has values alone, without 'fields'."
+            )
         for name, d in found.items():
             for value in d.limits():
                 if name != BODY_MASS_INDEX:
@@ -180,6 +216,11 @@ def population(source: Source) -> Population:
         f"patient = {source!r}; a population ({choices(shipped_populations())}), a YAML file, or a mapping of the "
         "fields of a patient is wanted."
     )
+
+
+def read_shipped(name: str) -> Mapping[str, Any]:
+    """What the file of a shipped population holds."""
+    return read_yaml(configs() / FOLDER / f"{name}.yaml")
 
 
 def shipped_populations() -> tuple[str, ...]:

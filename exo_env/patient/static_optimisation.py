@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.model.geometry.rotations import add, cross, dot, sub, vec
+from dms_core.model.geometry.rotations import add, cross, dot, sub, turned, vec
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.muscles.muscle import fibre_at_rest, fibre_state, pennation_cosine, tendon_state
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
@@ -24,9 +24,11 @@ class ArmTable(NamedTuple):
     """An arm and its load as arrays."""
 
     muscles: np.ndarray
-    """Numbers of each muscle (`ThelenMuscle.numbers`), shape (6, 15)."""
+    """Numbers of each muscle (`ThelenMuscle.numbers`), shape (n, 15), n muscles."""
+    sign: np.ndarray
+    """+1 for a flexor, -1 for an extensor, shape (n,)."""
     first: np.ndarray
-    """First point of each muscle's path, then the number of all points, shape (7,)."""
+    """First point of each muscle's path, then the number of all points, shape (n + 1,)."""
     moving: np.ndarray
     """True for a point of the forearm, False for one of the ground, shape (n,)."""
     points: np.ndarray
@@ -62,13 +64,6 @@ class LoadTable(NamedTuple):
 def row(x, k):
     """Row k as a tuple: an array of it would be dear inside a loop."""
     return x[k, 0], x[k, 1], x[k, 2]
-
-
-@compiled
-def turned(n, c, s, x):
-    """R x of a triple, for a turn about n by an angle of that cosine and sine (Rodrigues' formula)."""
-    w, along = cross(n, x), (1.0 - c) * dot(n, x)
-    return c * x[0] + s * w[0] + along * n[0], c * x[1] + s * w[1] + along * n[1], c * x[2] + s * w[2] + along * n[2]
 
 
 @compiled
@@ -205,7 +200,7 @@ def least_squares(wanted, full, out):
 
 @compiled
 def forces(arm, interval, lengths, tendon_force, activations, fibre, full, passive):
-    """Force along the tendon at full activation without the passive part, and that part [N], shapes (n, 6)."""
+    """Force along the tendon at full activation without the passive part, and that part [N], shapes (n, m)."""
     n, last = lengths.shape[0], lengths.shape[0] - 1
     for i in range(arm.muscles.shape[0]):
         par = arm.muscles[i]
@@ -224,7 +219,7 @@ def forces(arm, interval, lengths, tendon_force, activations, fibre, full, passi
 def sweep(arm, interval, moment, lengths, levers, relaxation, tendon_force, activations, work, moments):
     """One iteration between tendon strain and activation. Gives (largest change of an activation, shortage [Nm]).
 
-    work holds full and passive [N], shape (2, n, 6); moments, shape (2, 6), takes those of the muscles at full
+    work holds full and passive [N], shape (2, n, m); moments, shape (2, m), takes those of the muscles at full
     activation [Nm], then the activations.
     """
     n, m = lengths.shape
@@ -246,7 +241,7 @@ def sweep(arm, interval, moment, lengths, levers, relaxation, tendon_force, acti
 
 @compiled
 def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, activations):
-    """Fill moment [Nm], shape (n,), and activations [-], shape (n, 6).
+    """Fill moment [Nm], shape (n,), and activations [-], shape (n, m), m muscles.
 
     Gives the largest shortage [Nm] and the estimated error in an activation, at least `settled` where the iteration did
     not end by itself: changes fall by a rate r from one iteration to the next, and r / (1 - r) of the last is left.

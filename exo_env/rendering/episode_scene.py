@@ -7,26 +7,26 @@ import math
 import numpy as np
 
 from dms_core.model.geometry.frames import rotation_matrix
-from exo_env.ecosystem.arm import MUSCLES
-from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
 from exo_env.ecosystem.gym_machine import HANDLE, WEIGHT
+from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.rendering.scene import MusclePath, RopePath, Scene
-from exo_env.world.control_period import READING
 from exo_env.world.episode import Episode
 from exo_env.world.readout import Readout
+from exo_env.world.tables import STATUS
 
 UPPER_END = 0.22
 """Drawn length of the upper link [m]."""
 
 
-def staged(now: Readout, label: str) -> Scene:
+def scene_of(now: Readout, label: str) -> Scene:
     """The present scene.
 
     Args:
         now: readings of the episode that is shown.
         label: names the patient.
     """
-    episode, angle, hinge = now.episode, now.angle, now[READING.hinge]
+    episode, angle, hinge = now.episode, now.sensor("elbow_angle.angle"), now.sensor("exo_angle.angle")
+    psi = float(now.world.tables.plan.course[now.world.tables.status[STATUS.step], 0])
     arm, machine = episode.arm, episode.ecosystem.machine
     assert machine is not None
     grip = arm.elbow + arm.rotation(angle) @ arm.grip
@@ -40,14 +40,14 @@ def staged(now: Readout, label: str) -> Scene:
         elbow=arm.elbow[:2].copy(),
         grip=grip[:2],
         muscles=_muscles(episode, angle, now.activations),
-        ropes=_ropes(episode, hinge, now.tensions),
+        ropes=_ropes(episode, hinge, now),
         exo_links=_links(episode, hinge),
         elbow_angle=angle,
-        reference_angle=now.reference,
+        reference_angle=psi,
         time=episode.world.time,
-        error_deg=math.degrees(now.error),
-        muscle_moment=now[READING.muscle_moment],
-        device_moment=now[READING.exo_moment],
+        error_deg=math.degrees(angle - psi),
+        muscle_moment=now.sensor("muscle_moment"),
+        device_moment=now.sensor("exo_moment"),
         effort=episode.effort,
         label=label,
         weight=weight[:2],
@@ -60,20 +60,19 @@ def staged(now: Readout, label: str) -> Scene:
 def _muscles(episode: Episode, angle: float, activations: np.ndarray) -> tuple[MusclePath, ...]:
     """Paths of the muscles with their activations."""
     arm, A, found = episode.arm, episode.arm.rotation(angle), []
-    for m, a in zip(MUSCLES, activations, strict=True):
+    for m, a in zip(arm.muscles, activations, strict=True):
         path = arm.path(m, welded=True)
         points = [arm.elbow + A @ np.array(p.point) if p.body == "forearm" else np.array(p.point) for p in path]
         found.append((np.array(points)[:, :2], float(a)))
     return tuple(found)
 
 
-def _ropes(episode: Episode, hinge: float, tensions: np.ndarray) -> tuple[RopePath, ...]:
+def _ropes(episode: Episode, hinge: float, now: Readout) -> tuple[RopePath, ...]:
     """Paths of the ropes with their tensions."""
     worn, found = episode.worn, []
-    for name, tension in zip((AGONIST, ANTAGONIST), tensions, strict=True):
-        rope = getattr(worn.device, name)
+    for name, rope in worn.device.ropes.items():
         ends = np.array([_on_upper(episode, rope.upper), _on_lower(episode, hinge, rope.lower)])
-        found.append((ends[:, :2], float(tension)))
+        found.append((ends[:, :2], max(now.sensor(tension_sensor(name)), 0.0)))
     return tuple(found)
 
 

@@ -9,9 +9,11 @@ from pydantic import Field, model_validator
 
 from exo_env.jit import compiled
 from exo_env.settings import Settings
+from exo_env.tasks.task import FIRST_EVENT, NOTHING
 
-NOTHING, ANGLE, TENSION, REACTION, SOLVER = range(5)
-"""Codes of what ends an episode early."""
+EVENTS = ("angle", "tension", "reaction")
+"""Names of what ends an episode early, in the order of their codes."""
+ANGLE, TENSION, REACTION = range(FIRST_EVENT, FIRST_EVENT + len(EVENTS))
 
 
 class Limits(Settings):
@@ -41,36 +43,36 @@ class Limits(Settings):
 
 
 @compiled
-def event_code(limits, angle, agonist, antagonist, reaction):
-    """The limit that is exceeded, or NOTHING.
+def exceeded(limits, angle, tensions, reaction):
+    """Code of the limit that is exceeded, or NOTHING.
 
     Args:
         limits: `Limits.numbers`.
         angle: of the elbow [rad].
-        agonist: tension [N].
-        antagonist: tension [N].
+        tensions: of the ropes [N], shape (n,).
         reaction: size of the elbow's reaction force [N].
     """
     if not limits[0] <= angle <= limits[1]:
         return ANGLE
-    if not max(agonist, antagonist) <= limits[2]:
-        return TENSION
+    for i in range(tensions.shape[0]):
+        if not tensions[i] <= limits[2]:
+            return TENSION
     return NOTHING if reaction <= limits[3] else REACTION
 
 
-def event(code: int, limits: Limits, angle: float, tension: float, reaction: float) -> str:
+def limit_sentence(event: str, limits: Limits, angle: float, tension: float, reaction: float) -> str:
     """The sentence on a limit that was passed.
 
     Args:
-        code: ANGLE, TENSION or REACTION.
+        event: one of EVENTS.
         limits: of this environment.
         angle: of the elbow [rad].
-        tension: largest of both ropes [N].
+        tension: largest of all ropes [N].
         reaction: size of the elbow's reaction force [N].
     """
-    if code == ANGLE:
+    if event == "angle":
         low, high = limits.lowest_deg, limits.highest_deg
         return f"The elbow is at {math.degrees(angle):.2f} deg, outside {low:g} to {high:g} deg."
-    if code == TENSION:
+    if event == "tension":
         return f"A rope pulls with {tension:.0f} N; {limits.tension:g} N is the limit."
     return f"The elbow's reaction force is {reaction:.0f} N; {limits.reaction:g} N is the limit."

@@ -1,203 +1,117 @@
-"""Repetitions of the exercise: rest, flexion, pause, return, each move of minimum jerk (Flash and Hogan 1985).
+"""What a patient intends to do: the contract of a movement, and the simplest one, staying at rest.
 
-Angles stay between 20 and 100 degrees, where the muscles' straight lines have leverage (human.py). Which angles,
-durations and pauses occur is a distribution a field, as in a population of patients; all of them are assumed.
+A movement is psi(t), the elbow angle that the patient wants, as polynomials in pieces. It is a settings class whose
+fields are distributions of its numbers, and a compiled kernel that makes pieces of the numbers that were drawn:
+
+    kernel(w)      reads floats(plan, PLAN.movement), writes floats(plan, PLAN.starts) and
+                   matrix(plan, PLAN.coefficients), with plan = inner(w, WORLD.plan)
+
+Piece i holds from starts[i] [s] on, as sum_j coefficients[i, j] (t - starts[i])^j [rad]; the first holds before its
+start too, and the last for ever. The patient plans the motor command for psi, and errors are from psi; whether the
+device knows psi is the task's choice of channels.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from dms_core.errors import InputError
-from dms_core.model import MinimumJerk
+from dms_core.kernels import floats, inner, matrix
 from exo_env.jit import compiled
-from exo_env.patient.distributions import Draws, distribution
+from exo_env.patient.distributions import Distribution, Draws, distribution
+from exo_env.places import places
 from exo_env.settings import Settings
+from exo_env.world.tables import PLAN, WORLD
 
-LOWEST, HIGHEST = 20.0, 100.0
-"""Elbow angles between which the exercise stays [deg]."""
-MOST_REPETITIONS = 20
+START = "start_deg"
+"""Name of the number that every movement has first: the elbow angle at the start [deg]."""
 
 
-class Repetition(Settings):
-    """One movement of the reference, done `count` times: one begins `every` so often, or when the last one is over.
+class Movement(Settings):
+    """Base of all movements: a distribution for each number, in the order of the fields, `start_deg` first."""
 
-    The last two fields are the episode's, not the movement's, and so not in `model_dump()`.
-    """
-
-    start_deg: float = Field(default=25.0, ge=LOWEST, le=HIGHEST, description="angle at rest [deg]")
-    amplitude_deg: float = Field(default=60.0, gt=0.0, le=HIGHEST - LOWEST, description="of the flexion [deg]")
-    rest: float = Field(default=0.4, ge=0.0, le=10.0, description="before the flexion [s]")
-    duration: float = Field(default=2.0, ge=0.3, le=20.0, description="of each of the two moves [s]")
-    pause: float = Field(default=0.5, gt=0.0, le=10.0, description="at the top [s]")
-    count: int = Field(default=1, ge=1, le=MOST_REPETITIONS, exclude=True, description="times that it is done")
-    every: float = Field(default=0.0, ge=0.0, exclude=True, description="from one begin to the next, at least [s]")
-
-    @model_validator(mode="after")
-    def _within_leverage(self):
-        if self.start_deg + self.amplitude_deg > HIGHEST + 1e-9:
-            raise ValueError(
-                f"start_deg = {self.start_deg} and amplitude_deg = {self.amplitude_deg} lead to "
-                f"{self.start_deg + self.amplitude_deg} deg; at most {HIGHEST} deg are wanted"
-            )
-        return self
+    kernel: ClassVar[Any]
 
     @classmethod
-    def of_row(cls, row: Iterable[float]) -> Self:
-        """The repetition of a row of numbers in the order of MOVEMENT."""
-        *given, often, every = map(float, row)
-        return cls(**dict(zip(MOVED, given, strict=True)), count=int(often), every=every)
+    def of(cls, source: Mapping[str, Any] | None) -> Self:
+        """The movement with some of its distributions given.
 
-    def row(self) -> np.ndarray:
-        """All fields as numbers, shape (len(MOVEMENT),); `of_row` takes them back."""
-        return np.array([*(getattr(self, name) for name in MOVED), self.count, self.every], dtype=float)
-
-    @property
-    def signal(self) -> MinimumJerk:
-        """psi(t) [rad]."""
-        low, high = np.radians(self.start_deg), np.radians(self.start_deg + self.amplitude_deg)
-        move = (self.duration, self.pause, self.duration)
-        rests = [self.rest, *[self.interval - sum(move)] * (self.count - 1)]
-        times, values = np.cumsum([t for rest in rests for t in (rest, *move)]), (low, high, high, low) * self.count
-        # Where there is no rest, a return ends when the next flexion begins.
-        kept = np.flatnonzero(np.diff(times, prepend=-1.0) > 0.0)
-        return MinimumJerk(times=tuple(times[kept]), values=tuple(values[k] for k in kept))
-
-    @property
-    def interval(self) -> float:
-        """From the begin of one to the begin of the next [s]."""
-        return max(self.every, self.rest + 2.0 * self.duration + self.pause)
-
-    def course(self, times: np.ndarray) -> np.ndarray:
-        """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at times [s] in rising order, shape (n, 3)."""
-        pieces, found = self.signal.pieces(), np.empty((len(times), 3))
-        course_of(pieces.t, pieces.c, np.asarray(times, float), found)
-        return found
-
-
-class Movement(NamedTuple):
-    """Where each field of a repetition stands in its row of numbers."""
-
-    start_deg: int = 0
-    amplitude_deg: int = 1
-    rest: int = 2
-    duration: int = 3
-    pause: int = 4
-    often: int = 5
-    every: int = 6
-
-
-MOVEMENT = Movement()
-MOVED = MOVEMENT._fields[: MOVEMENT.often]
-"""Fields that are drawn."""
-
-
-@compiled
-def put_pieces(movement, t, c):
-    """Pieces of `Repetition.signal`, of a row of numbers in the order of MOVEMENT.
-
-    Args:
-        movement: shape (7,).
-        t: starts of the pieces [s], shape (n,), n from 4 count + 1. Where there is no rest between repetitions there
-            are fewer pieces, and the last stands for them.
-        c: their coefficients, shape (n, 6).
-    """
-    low = math.radians(movement[MOVEMENT.start_deg])
-    high = math.radians(movement[MOVEMENT.start_deg] + movement[MOVEMENT.amplitude_deg])
-    rest, move, pause = movement[MOVEMENT.rest], movement[MOVEMENT.duration], movement[MOVEMENT.pause]
-    between = max(movement[MOVEMENT.every], rest + 2.0 * move + pause) - (move + pause + move)
-    # A piece of rest before the first knot.
-    c[:], k, now = 0.0, 1, rest
-    t[0], t[1] = rest - 1.0, rest
-    c[0, 0] = c[1, 0] = low
-    for i in range(int(movement[MOVEMENT.often])):
-        if i > 0 and now + between > now:
-            now += between
-            k += 1
-            t[k], c[k, 0] = now, low
-        for time, value in ((move, high), (pause, high), (move, low)):
-            step = value - c[k, 0]
-            c[k, 3], c[k, 4], c[k, 5] = 10.0 * step / time**3, -15.0 * step / time**4, 6.0 * step / time**5
-            now += time
-            k += 1
-            t[k], c[k, 0] = now, value
-    for i in range(k + 1, t.shape[0]):
-        t[i] = t[k]
-        c[i] = c[k]
-
-
-@compiled
-def course_of(starts, c, times, out):
-    """Value, rate and acceleration of a signal's pieces, which go on behind the last and before the first.
-
-    Args:
-        starts: of the pieces [s], shape (n,).
-        c: their coefficients, shape (n, 6).
-        times: in rising order [s], shape (k,).
-        out: shape (k, 3).
-    """
-    i = 0
-    for k in range(times.shape[0]):
-        while i + 1 < starts.shape[0] and starts[i + 1] <= times[k]:
-            i += 1
-        x = times[k] - starts[i]
-        out[k, 0] = out[k, 1] = out[k, 2] = 0.0
-        for j in range(c.shape[1] - 1, -1, -1):
-            # Horner's scheme of a polynomial, its rate and half its acceleration.
-            out[k, 2] = out[k, 2] * x + out[k, 1]
-            out[k, 1] = out[k, 1] * x + out[k, 0]
-            out[k, 0] = out[k, 0] * x + c[i, j]
-        out[k, 2] *= 2.0
-
-
-class Repetitions(Settings):
-    """Repetitions to draw from: a distribution for each field of `Repetition`, see distributions.py."""
-
-    start_deg: Any = {"uniform": [20.0, 35.0]}
-    amplitude_deg: Any = {"uniform": [40.0, 65.0]}
-    rest: Any = 0.4
-    duration: Any = {"uniform": [1.6, 2.2]}
-    pause: Any = {"uniform": [0.3, 0.8]}
-
-    @model_validator(mode="after")
-    def _possible(self):
-        """Both ends of every spread must be repetitions."""
-        for end in (0, -1):
-            Repetition(**{name: self._spread(name).limits()[end] for name in type(self).model_fields})
-        return self
-
-    @classmethod
-    def of(cls, source: Mapping[str, Any] | Repetition | Self | None) -> Repetitions:
-        """From what a user gives: some fields of it, one repetition, or None for the defaults."""
-        if isinstance(source, Repetitions):
-            return source
-        if isinstance(source, Repetition):
-            return cls(**source.model_dump())
+        Raises:
+            InputError: it is no mapping, or a distribution is not possible.
+        """
         if source is None or isinstance(source, Mapping):
             return cls(**(source or {}))
-        fields = ", ".join(cls.model_fields)
-        raise InputError(f"reference = {source!r}; a mapping with some of {fields} is wanted, or None.")
+        expected = ", ".join(cls.model_fields)
+        raise InputError(f"reference = {source!r}: expected a mapping with some of {expected}, or None.")
 
-    def _spread(self, name: str) -> Any:
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the numbers that are drawn."""
+        return tuple(type(self).model_fields)
+
+    @property
+    def pieces(self) -> int:
+        """Number of pieces of psi, at least 3."""
+        raise NotImplementedError
+
+    def longest(self) -> float:
+        """Time after which psi is at rest at the latest [s]."""
+        return 0.0
+
+    def episode_numbers(self, duration: float) -> tuple[float, ...]:
+        """Further numbers that the episode fixes, behind those that are drawn; `duration` is the episode's [s]."""
+        return ()
+
+    def spread(self, name: str) -> Distribution:
+        """Distribution of a number.
+
+        Raises:
+            InputError: what was given is none.
+        """
         try:
             return distribution(getattr(self, name))
         except InputError as error:
             raise InputError(f"reference: {name}: {error}") from None
 
-    def sample(self, generator: np.random.Generator) -> Repetition:
-        """A repetition; one number is drawn for each field."""
-        return Repetition.of_row([*self.draw(generator), 1.0, 0.0])
+    def draw(self, key: np.uint64, duration: float) -> np.ndarray:
+        """Numbers of the movement in the episode of a key (streams.py); `duration` is the episode's [s]."""
+        return np.array([*self._draws.sample(key), *self.episode_numbers(duration)])
 
-    def draw(self, generator: np.random.Generator) -> np.ndarray:
-        """As `sample`, the fields as numbers in the order of MOVEMENT, shape (5,)."""
-        return self._draws.sample(generator)
+    def values(self, numbers: np.ndarray) -> dict[str, float]:
+        """The drawn numbers by name."""
+        return dict(zip(self.names, numbers.tolist(), strict=False))
 
     @cached_property
     def _draws(self) -> Draws:
-        return Draws([self._spread(name) for name in MOVED])
+        return Draws({f"movement.{name}": self.spread(name) for name in self.names})
+
+
+REST = places((START,))
+
+
+@compiled
+def _stay(w):
+    """psi stays at the start."""
+    plan = inner(w, WORLD.plan)
+    t, c = floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients)
+    c[:] = 0.0
+    for k in range(t.shape[0]):
+        t[k] = float(k)
+        c[k, 0] = math.radians(floats(plan, PLAN.movement)[REST.start_deg])
+
+
+class Stay(Movement):
+    """The patient wants to stay where the episode begins."""
+
+    kernel: ClassVar[Any] = _stay
+    start_deg: Any = {"uniform": [20.0, 100.0]}
+
+    @property
+    def pieces(self) -> int:
+        """Three, which say the same."""
+        return 3

@@ -5,16 +5,17 @@
                  Wingate 1985, Phys. Ther. 65:1666-1670), so 95 % of readings lie within 4.7 to 6.7 deg: what a
                  therapist cannot tell from the reference costs little, and what everybody sees earns nothing.
     assistance   -max(M_exo - M_lack, -M_exo, 0) / mean M_need, at least -2
-                 The device's moment beyond what this patient lacks (need.py): 0 for help that is needed, about -1 where
-                 the device does all for somebody who needs nothing, and less where it pulls down. People after stroke
-                 let a robot do the work (Wolbrecht et al. 2008, IEEE TNSRE 16:286-297), and slacking is what training
-                 by robots loses most by (Reinkensmeyer et al. 2009, doi:10.1109/IEMBS.2009.5333978): the patient is to
-                 do what the patient can. Who can do nothing is helped for nothing.
+                 The device's moment beyond what this patient lacks (patient/ability.py): 0 for help that is needed,
+                 about -1 where the device does all for somebody who needs nothing, and less where it pulls down.
+                 People after stroke let a robot do the work (Wolbrecht et al. 2008, IEEE TNSRE 16:286-297), and
+                 slacking is what training by robots loses most by (Reinkensmeyer et al. 2009,
+                 doi:10.1109/IEMBS.2009.5333978): the patient is to do what the patient can. Who can do nothing is
+                 helped for nothing.
     smoothness   -mean((a - a_before)^2) / 4
                  -1 for an action that jumps from end to end; assumed.
     reaction     -max(F / 500 N - 1, 0), at least -2
                  Elbow reaction above that of quiet lifting, which pulling against oneself causes; assumed.
-    unsafe       -1 once, where an event ends the episode, see events.py
+    unsafe       -1 once, where an event ends the episode, see limits.py
 
 The most that a step can earn is 1, a followed reference without a newton too much: 300 in an episode of 6 s. With the
 default weights a robot that does everything for somebody who needs nothing still earns a quarter of that, more than an
@@ -27,14 +28,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from pydantic import Field
 
 from exo_env.jit import compiled
+from exo_env.places import places
 from exo_env.settings import Settings
 
-TERMS = ("tracking", "assistance", "smoothness", "reaction", "unsafe")
-"""In the order of the compiled code."""
 TRACKING_WIDTH = math.radians(5.0)
 """Error that earns 1/e [rad]."""
 REACTION_THRESHOLD, MOST = 500.0, 2.0
@@ -50,14 +49,14 @@ class Weights(Settings):
     reaction: float = Field(default=0.2, ge=0.0, le=1e6)
     unsafe: float = Field(default=100.0, ge=0.0, le=1e6)
 
-    def numbers(self) -> np.ndarray:
-        """In the order of TERMS, shape (5,)."""
-        return np.array([getattr(self, name) for name in TERMS])
+
+TERM = places(Weights.model_fields)
+"""Place of each term."""
 
 
 @compiled
 def term_values(error, moment, lacking, scale, reaction, action, before, unsafe, out):
-    """Value of each term [-], in the order of TERMS.
+    """Value of each term [-], at the places of TERM.
 
     Args:
         error: elbow angle minus reference [rad].
@@ -65,13 +64,16 @@ def term_values(error, moment, lacking, scale, reaction, action, before, unsafe,
         lacking: what the patient cannot give, at least 0 [Nm].
         scale: mean moment that the movement needs [Nm].
         reaction: size of the elbow's reaction force [N].
-        action: now, shape (2,).
-        before: the action before, shape (2,).
+        action: now, shape (n,).
+        before: the action before, shape (n,).
         unsafe: an event ends the episode.
-        out: shape (5,).
+        out: shape (len(TERM),).
     """
-    out[0] = math.exp(-((error / TRACKING_WIDTH) ** 2))
-    out[1] = -min(max(moment - lacking, -moment, 0.0) / scale, MOST)
-    out[2] = -0.125 * ((action[0] - before[0]) ** 2 + (action[1] - before[1]) ** 2)
-    out[3] = -min(max(reaction / REACTION_THRESHOLD - 1.0, 0.0), MOST)
-    out[4] = -1.0 if unsafe else 0.0
+    change = 0.0
+    for i in range(action.shape[0]):
+        change += (action[i] - before[i]) ** 2
+    out[TERM.tracking] = math.exp(-((error / TRACKING_WIDTH) ** 2))
+    out[TERM.assistance] = -min(max(moment - lacking, -moment, 0.0) / scale, MOST)
+    out[TERM.smoothness] = -0.25 * change / action.shape[0]
+    out[TERM.reaction] = -min(max(reaction / REACTION_THRESHOLD - 1.0, 0.0), MOST)
+    out[TERM.unsafe] = -1.0 if unsafe else 0.0

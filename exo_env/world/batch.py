@@ -10,45 +10,43 @@ from typing import Any
 
 import numpy as np
 
-from dms_core.compiled.arena import Packed, floats, ints, table_at
-from dms_core.simulation.step_control import DONE
+from dms_core.kernels import DONE, Packed, floats, inner, ints, table_at
 from exo_env.jit import compiled
-from exo_env.patient.effort import STATE as EFFORT
-from exo_env.tasks.rewards import TERMS
-from exo_env.world.control_period import PLANT, READING, STATUS, run_period
-from exo_env.world.reset import OPEN, SETTING, open_episode
+from exo_env.world.control_period import run_period
+from exo_env.world.reset import BEGUN, begin_episode
+from exo_env.world.tables import OBSERVER, STATUS, TASK, WORLD
 from exo_env.world.work_sharing import AREAS, areas_of, claim, fetch_ahead
 
-FIELDS, SETTING_FIELDS, N_TERMS = len(PLANT), len(SETTING), len(TERMS)
-NUMBERS = ("reward", *TERMS, "time", "tracking_error", "device_share", "effort", "elbow_reaction")
-"""What is collected of each world, in the order of `Batch.numbers`; time in control periods, error in rad."""
-BESIDE = ("noise", "wanted", "course", "preview", "lacking", "newton", "newton_lu", "rates", "rate_lu")
-"""Fields not fetched ahead: of what goes over an episode a period reads one row, and worlds share their patterns."""
+FIELDS = len(WORLD)
+BESIDE = (
+    "noise", "tremor", "wanted", "course", "preview", "lacking", "newton", "newton_lu", "rates", "rate_lu", "draw",
+    "scaling", "subject", "rest", "cleared",
+)  # fmt: skip
+"""Fields not fetched ahead: of what goes over an episode a period reads one row, and what a reset reads it does not."""
 
 
 @compiled
-def collect(p, observation, numbers, status):
-    """What the agent is told of a world."""
-    seen, r, terms, now = (
-        floats(p, PLANT.observation),
-        floats(p, PLANT.reading),
-        floats(p, PLANT.terms),
-        ints(p, PLANT.status),
+def collect(w, told, observation, numbers, status):
+    """What the agent is told of a world: observation; reward, terms and the readings at places `told`; status."""
+    seen, task, now = (
+        floats(inner(w, WORLD.observer), OBSERVER.observation),
+        inner(w, WORLD.task),
+        ints(w, WORLD.status),
     )
+    r, terms = floats(task, TASK.readings), floats(task, TASK.terms)
     for i in range(observation.shape[0]):
         observation[i] = seen[i]
-    numbers[0] = floats(p, PLANT.reward)[0]
-    for i in range(N_TERMS):
+    numbers[0] = floats(task, TASK.reward)[0]
+    for i in range(terms.shape[0]):
         numbers[1 + i] = terms[i]
-    numbers[N_TERMS + 1], numbers[N_TERMS + 2] = now[STATUS.step], r[READING.error]
-    numbers[N_TERMS + 3], numbers[N_TERMS + 4] = r[READING.share], floats(p, PLANT.effort)[EFFORT.effort]
-    numbers[N_TERMS + 5] = r[READING.reaction]
+    for i in range(told.shape[0]):
+        numbers[1 + terms.shape[0] + i] = r[told[i]]
     for i in range(status.shape[0]):
         status[i] = now[i]
 
 
 @compiled(nogil=True)
-def run_some(addresses, areas, which, actions, observations, numbers, status, ahead, done):
+def run_some(addresses, areas, which, actions, told, observations, numbers, status, ahead, done):
     """A control period of worlds which[k] that no other thread has taken, until all are done.
 
     `done` counts those that are taken; the world `ahead` of them is fetched. Where the solver gives up, `status` holds
@@ -59,24 +57,24 @@ def run_some(addresses, areas, which, actions, observations, numbers, status, ah
         if k + ahead < which.shape[0]:
             fetch_ahead(areas[which[k + ahead]])
         i = which[k]
-        p = table_at(addresses[i], FIELDS)
-        if run_period(p, actions[i]) == DONE:
-            collect(p, observations[i], numbers[i], status[i])
+        w = table_at(addresses[i], FIELDS)
+        if run_period(w, actions[i]) == DONE:
+            collect(w, told, observations[i], numbers[i], status[i])
         else:
-            status[i, STATUS.code] = ints(p, PLANT.status)[STATUS.code]
+            status[i, STATUS.code] = ints(w, WORLD.status)[STATUS.code]
         k = claim(done)
 
 
 @compiled(nogil=True)
-def open_some(addresses, settings, which, observations, numbers, status, codes, done):
-    """Open episodes of the worlds which[k] that no other thread has taken; `codes` holds what came of each."""
+def begin_some(addresses, which, told, observations, numbers, status, codes, done):
+    """Begin episodes in the worlds which[k] that no other thread has taken; `codes` holds what came of each."""
     k = claim(done)
     while k < which.shape[0]:
         i = which[k]
-        p = table_at(addresses[i], FIELDS)
-        codes[k] = open_episode(p, table_at(settings[i], SETTING_FIELDS))
-        if codes[k] == OPEN:
-            collect(p, observations[i], numbers[i], status[i])
+        w = table_at(addresses[i], FIELDS)
+        codes[k] = begin_episode(w)
+        if codes[k] == BEGUN:
+            collect(w, told, observations[i], numbers[i], status[i])
         k = claim(done)
 
 
@@ -86,54 +84,56 @@ class Batch:
     Args:
         size: number of worlds.
         observed: components of an observation.
+        terms: number of reward terms.
+        told: places of the readings that are collected.
         threads: that step them; None takes one for each core.
 
     Attributes:
         observations: float32, shape (size, observed).
-        numbers: shape (size, len(NUMBERS)).
-        status: counters of control_period.STATUS, shape (size, 4).
+        numbers: reward, terms and readings, shape (size, 1 + terms + len(told)).
+        status: at the places of tables.STATUS, shape (size, 3).
     """
 
-    def __init__(self, size: int, observed: int, threads: int | None = None) -> None:
+    def __init__(self, size: int, observed: int, terms: int, told: np.ndarray, threads: int | None = None) -> None:
         self.threads = min(size, threads or _cores())
-        self._addresses, self._settings = np.zeros(size, np.int64), np.zeros(size, np.int64)
+        self._addresses, self._told = np.zeros(size, np.int64), told
         self._areas = np.zeros((size, AREAS, 2), np.int64)
         # Compiled code knows addresses only: what they point to is kept here.
-        self.worlds: list[tuple[Packed, Packed] | None] = [None] * size
+        self.worlds: list[Packed | None] = [None] * size
         self.observations = np.zeros((size, observed), np.float32)
-        self.numbers = np.zeros((size, len(NUMBERS)))
+        self.numbers = np.zeros((size, 1 + terms + len(told)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
         # The thread that calls works, too.
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
-    def put(self, i: int, world: Packed, setting: Packed) -> None:
-        """World i is that of a packed Plant, which a packed Setting opens."""
-        if self.worlds[i] != (world, setting):
-            self.worlds[i], self._areas[i] = (world, setting), areas_of(world, BESIDE)
-            self._addresses[i], self._settings[i] = world.table.ctypes.data, setting.table.ctypes.data
+    def put(self, i: int, world: Packed) -> None:
+        """World i is that of packed WorldTables."""
+        if self.worlds[i] is not world:
+            self.worlds[i], self._areas[i] = world, areas_of(world, BESIDE)
+            self._addresses[i] = world.table.ctypes.data
 
     def take(self, i: int) -> None:
-        """Collect what world i tells, where it was moved by other hands."""
-        collect(table_at(self._addresses[i], FIELDS), self.observations[i], self.numbers[i], self.status[i])
+        """Collect what world i tells, where something else than the batch has moved it."""
+        collect(table_at(self._addresses[i], FIELDS), self._told, self.observations[i], self.numbers[i], self.status[i])
 
-    def open(self, which: np.ndarray) -> np.ndarray:
-        """Open the episodes of the worlds `which`, shape (k,), as their settings say; gives what came of each."""
+    def begin(self, which: np.ndarray) -> np.ndarray:
+        """Begin episodes in the worlds `which`, shape (k,), as drawn for them; gives what came of each."""
         codes = np.zeros(len(which), np.int64)
         self._share(
-            len(which), open_some, self._addresses, self._settings, which, self.observations, self.numbers, self.status,
+            len(which), begin_some, self._addresses, which, self._told, self.observations, self.numbers, self.status,
             codes,
         )  # fmt: skip
         return codes
 
     def run(self, which: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, 2).
+        """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, n).
 
         Returns:
             Those whose solver gave up.
         """
         self._share(
-            len(which), run_some, self._addresses, self._areas, which, actions, self.observations, self.numbers,
-            self.status, min(self.threads, len(which)),
+            len(which), run_some, self._addresses, self._areas, which, actions, self._told, self.observations,
+            self.numbers, self.status, min(self.threads, len(which)),
         )  # fmt: skip
         return which[self.status[which, STATUS.code] != DONE]
 

@@ -2,95 +2,119 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dms_core import Model
-from dms_core.simulation.dynamics import World
+from dms_core import Model, World
 from exo_env.drives.drive import Drive
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.ecosystem.exoskeleton import WornExoskeleton
+from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.patient.ability import Need
-from exo_env.patient.effort import STATE
+from exo_env.patient.effort import PRESENT
 from exo_env.patient.patient import Patient
-from exo_env.tasks.movement import Repetition
+from exo_env.world.tables import WorldTables
 
 if TYPE_CHECKING:
-    from exo_env.world.world import Rig
+    from exo_env.world.world import PatientWorld
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """What is drawn for an episode."""
+
+    key: int
+    """Of the random streams (streams.py), which the noise of the episode comes from."""
+    patient: np.ndarray
+    """Row of the patient, in the order of FIELDS."""
+    load: float
+    """Weight on the machine [kg]."""
+    movement: np.ndarray
+    """Numbers of the movement, with those that the episode fixes."""
+    start: float
+    """Elbow angle at the start [rad]."""
+    phase: float
+    """Of the tremor [rad]."""
 
 
 class Episode:
-    """A patient in the rig. World, model and effort are those of the present: another patient's after the next reset.
+    """A patient in the device. World, model and effort are those of the present: another's after the next reset.
 
     Args:
-        rig: device, machine and world.
-        who: the patient as a row of numbers in the order of FIELDS.
-        load: weight on the machine [kg].
-        movement: the repetition as a row of numbers in the order of MOVEMENT.
+        world: in which it takes place.
+        draw: who and what was drawn.
         need: of the patient on this movement.
-        start: elbow angle at its start [rad].
     """
 
-    def __init__(self, rig: Rig, who: np.ndarray, load: float, movement: np.ndarray, need: Need, start: float) -> None:
-        self.rig, self.who, self.load, self.movement, self.need, self.start = rig, who, load, movement, need, start
-        self.course = rig.plant.course.copy()
+    def __init__(self, world: PatientWorld, draw: Draw, need: Need) -> None:
+        self._world, self.draw, self.need = world, draw, need
+        self.course = world.tables.plan.course.copy()
         """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at the control times, shape (n, 3)."""
 
     @cached_property
     def patient(self) -> Patient:
         """Who."""
-        return Patient.of_row(self.who)
+        return Patient.of_row(self.draw.patient)
 
-    @cached_property
-    def repetition(self) -> Repetition:
-        """The movement, with how often it is done."""
-        return Repetition.of_row(self.movement)
+    @property
+    def load(self) -> float:
+        """Weight on the machine [kg]."""
+        return self.draw.load
+
+    @property
+    def movement(self) -> np.ndarray:
+        """Numbers of the movement."""
+        return self.draw.movement
 
     @property
     def drive(self) -> Drive:
-        """Of the action mode."""
-        return self.rig.drive
+        """From actions to commands."""
+        return self._world.drive
 
     @property
     def times(self) -> np.ndarray:
         """Control times [s]."""
-        return self.rig.times
+        return self._world.times
 
     @property
     def world(self) -> World:
         """What moves."""
-        return self.rig.world
+        return self._world.dynamics
+
+    @property
+    def tables(self) -> WorldTables:
+        """The arrays of the present."""
+        return self._world.tables
 
     @property
     def model(self) -> Model:
         """The world's equations, with the numbers of this patient; its declarations and start are another's."""
-        return self.rig.model
+        return self._world.model
 
     @property
     def names(self) -> dict[str, int]:
-        """Place of each sensor's component in a reading."""
-        return self.rig.names
+        """Place of each sensor's component in a reading of the model."""
+        return self._world.names
 
     @property
     def effort(self) -> float:
         """What the patient intends, as a multiple of what was planned: s [-]."""
-        return float(self.rig.plant.effort[STATE.effort])
+        return float(self.tables.patient.effort.present[PRESENT.effort])
 
     @cached_property
     def ecosystem(self) -> Ecosystem:
         """Person, device, machine and weight."""
-        return self.rig.ecosystem.changed(person=self.patient.person, weight=self.load)
+        return self._world.ecosystem.changed(person=self.patient.person, weight=self.load)
 
     @cached_property
     def arm(self) -> Arm:
         """Of the patient."""
-        return Arm(self.patient.person)
+        return self.ecosystem.arm()
 
     @cached_property
     def worn(self) -> WornExoskeleton:
         """The device on this arm."""
-        e = self.ecosystem
-        return WornExoskeleton(e.device, self.arm, e.misalignment, e.guide)
+        return self.ecosystem.worn()

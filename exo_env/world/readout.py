@@ -1,4 +1,4 @@
-"""True readings of an episode, by the names that observations, rewards and events use, and what `info` tells."""
+"""True readings of an episode by name, and what `info` tells."""
 
 from __future__ import annotations
 
@@ -7,107 +7,105 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.patient.patient import fields_of
-from exo_env.tasks.limits import NOTHING, SOLVER, Limits, event
-from exo_env.tasks.movement import MOVED
-from exo_env.tasks.rewards import TERMS
-from exo_env.world.control_period import READING, STATUS, Plant
+from exo_env.tasks.movement import Movement
+from exo_env.tasks.task import NOTHING, SOLVER
 from exo_env.world.episode import Episode
+from exo_env.world.tables import STATUS
+from exo_env.world.world import PatientWorld
 
 
 class Readout:
-    """What the sensors of an episode's model say at the present control time.
+    """What the world says at the present control time.
 
     Args:
-        episode: whose world is read.
-        plant: its arrays.
+        world: that is read.
+        episode: that takes place in it.
     """
 
-    def __init__(self, episode: Episode, plant: Plant) -> None:
-        self.episode, self.plant = episode, plant
-        self._activation = np.array([episode.names[f"{m}.sensor.activation"] for m in MUSCLES])
+    def __init__(self, world: PatientWorld, episode: Episode) -> None:
+        self.world, self.episode = world, episode
+        self._places = {r.name: (k, len(r.labels)) for k, r in enumerate(world.task.readings)}
 
-    def __getitem__(self, place: int) -> float:
-        """A reading by its place in READING."""
-        return float(self.plant.reading[place])
+    def __call__(self, name: str) -> np.ndarray:
+        """Components of a reading of the task, by its name."""
+        k, count = self._places[name]
+        first = self.world.tables.task.first[k]
+        return self.world.tables.task.readings[first : first + count].copy()
 
-    @property
-    def angle(self) -> float:
-        """Of the elbow [rad]."""
-        return self[READING.angle]
+    def number(self, name: str) -> float:
+        """A reading of one component."""
+        return float(self(name)[0])
 
-    @property
-    def reference(self) -> float:
-        """psi [rad]."""
-        return float(self.plant.course[self.plant.status[STATUS.step], 0])
-
-    @property
-    def error(self) -> float:
-        """Elbow angle minus reference [rad]."""
-        return self[READING.error]
-
-    @property
-    def tensions(self) -> np.ndarray:
-        """Of agonist and antagonist rope [N], shape (2,)."""
-        return self.plant.reading[READING.agonist : READING.antagonist + 1].copy()
+    def sensor(self, name: str) -> float:
+        """A component of the model's sensors, by its name."""
+        return float(self.world.tables.dynamics.y[self.world.names[name]])
 
     @property
     def activations(self) -> np.ndarray:
-        """Of the muscles [-], shape (6,)."""
-        return self.plant.y[self._activation]
+        """Activations of the muscles [-], shape (m,)."""
+        return np.array([self.sensor(muscle_sensor(m, "activation")) for m in self.episode.arm.muscles])
 
     def readings(self) -> dict[str, float]:
-        """Every sensor, what follows from them, the commands reached, counts and worst errors of the solver."""
-        e = self.episode
-        found = {name: float(self.plant.y[k]) for name, k in e.names.items()}
-        found |= {
-            "time": e.world.time, "reference": self.reference, "tracking_error": self.error,
-            "elbow_reaction": self[READING.reaction], "device_share": self[READING.share], "effort": e.effort,
-        }  # fmt: skip
-        found |= {name: float(x) for name, x in zip(e.drive.inputs, self.plant.commands, strict=True)}
-        return found | {f"solver.{name}": float(x) for name, x in e.world.stats().as_dict().items()}
+        """Every sensor of the model, the readings of the task, the commands reached, and the solver's counts.
 
-    def happened(self, limits: Limits) -> str | None:
+        Readings of several components have the component's label behind a dot; those that copy a sensor are left to
+        the sensor's name. `tracking_error` and `elbow_reaction` are the readings `error` and `reaction`.
+        """
+        world, tables = self.world, self.world.tables
+        found = {name: float(tables.dynamics.y[k]) for name, k in world.names.items()}
+        found["time"] = self.episode.world.time
+        for reading in world.task.readings:
+            if not reading.sensors:
+                names = [f"{reading.name}.{label}" if label else reading.name for label in reading.labels]
+                found |= dict(zip(names, self(reading.name).tolist(), strict=True))
+        found |= {new: found[old] for old, new in OTHER_NAMES.items() if old in found}
+        commands = world.drive.commands(world.ecosystem.device)
+        found |= {c.name: float(x) for c, x in zip(commands, tables.drive.commands, strict=True)}
+        return found | {f"solver.{name}": float(x) for name, x in self.episode.world.stats().as_dict().items()}
+
+    def happened(self) -> str | None:
         """The sentence on what ended the episode, or None."""
-        code = self.plant.status[STATUS.event]
+        code = int(self.world.tables.status[STATUS.event])
         if code == NOTHING:
             return None
         if code == SOLVER:
-            world = self.episode.world
-            return f"{world.result.value} Stopped at t = {world.time:.6g} s."
-        return event(int(code), limits, self.angle, float(max(self.tensions)), self[READING.reaction])
+            dynamics = self.episode.world
+            return f"{dynamics.result.value} Stopped at t = {dynamics.time:.6g} s."
+        return self.world.task.event(code, self)
 
-    def start_info(self) -> dict[str, Any]:
-        """What the episode is made of."""
-        e = self.episode
+    def start_info(self, movement: Movement) -> dict[str, Any]:
+        """What the episode is made of; `movement` names the numbers of the movement."""
+        draw = self.episode.draw
         return {
-            "patient": fields_of(e.who.tolist()),
-            "load": e.load,
-            "ability": e.need.ability,
-            "reference": dict(zip(MOVED, e.movement.tolist(), strict=False)),
+            "patient": fields_of(draw.patient.tolist()),
+            "load": draw.load,
+            "ability": self.episode.need.ability,
+            "reference": movement.values(draw.movement),
             # Given in degrees, kept in radians: the way back leaves the last digit.
-            "initial_angle_deg": round(math.degrees(e.start), 10),
+            "initial_angle_deg": round(math.degrees(draw.start), 10),
         }
 
     def info(self, weights: dict[str, float], happened: str | None) -> dict[str, Any]:
-        """Of a step.
+        """What a step tells.
 
         Args:
             weights: of the reward.
             happened: what ended the episode.
         """
-        plant = self.plant
+        task, tables = self.world.task, self.world.tables
         found: dict[str, Any] = {
-            "reward_terms": dict(zip(TERMS, plant.terms.tolist(), strict=True)),
+            "reward_terms": dict(zip(task.terms, tables.task.terms.tolist(), strict=True)),
             "reward_weights": weights.copy(),
-            "time": float(self.episode.times[plant.status[STATUS.step]]),
-            "tracking_error_deg": math.degrees(self.error),
-            "device_share": self[READING.share],
-            "effort": self.episode.effort,
-            "elbow_reaction": self[READING.reaction],
-            "solver_failed": bool(plant.status[STATUS.event] == SOLVER),
+            "time": float(self.world.times[tables.status[STATUS.step]]),
+            **{told.name: told.factor * self.number(told.reading) for told in task.told},
+            "solver_failed": bool(tables.status[STATUS.event] == SOLVER),
         }
         if happened is not None:
             found["event"] = happened
         return found
+
+
+OTHER_NAMES = {"error": "tracking_error", "reaction": "elbow_reaction"}
+"""Names that readings have had since version 0.1."""

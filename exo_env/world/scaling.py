@@ -1,12 +1,15 @@
-"""How the numbers of a world follow from a person's sizes and the weight, without declaring and placing every element.
+"""How the numbers of a world follow from a person's sizes and the load, without declaring and placing every element.
 
 Masses go with the body mass M, lengths with the height H, inertias with M H^2, maximal forces with strength M / H
-(human.py). So every number of the compiled tables is linear in few monomials of the sizes,
+(ecosystem/arm.py), and numbers of joints with the traits that act in joints. So every number of the compiled tables is
+linear in few monomials,
 
-    x = C phi,   phi = (1, H, H^2, M, M H^2, weight, strength M / H, tau_act, tau_deact, 1 / min(tau_act, tau_deact))
+    x = C phi,   phi = (1, H, H^2, M, M H^2, load, strength M / H, tau_act, tau_deact, 1 / min(tau_act, tau_deact),
+                        traits of joints)
 
-with constants C for a device, a drive and a sex, found by declaring as many persons as there are monomials. Only the
-length of the gym rope and the start of what moves are not linear; start_kernel.py gives them.
+with constants C for an ecosystem, a drive and a sex, found by declaring as many persons as there are monomials; one
+more person is declared to see that it is so. Only the length of the gym rope and the start of what moves are not
+linear; rest_pose.py gives them.
 """
 
 from __future__ import annotations
@@ -18,24 +21,42 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core import Model
+from dms_core.assembly.layout import Layout, same_structure
+from dms_core.errors import InputError, ModelError
+from dms_core.kernels import floats, inner, matrix
 from dms_core.model import Constant, System
 from dms_core.model.signals import AnySignal
-from exo_env.drives.drive import DRIVES, Drive, drive_inputs
-from exo_env.ecosystem.arm import HEIGHT_0, MASS_0, MUSCLES, Arm, Person
+from exo_env.drives.drive import Drive
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
+from exo_env.ecosystem.gym_machine import ROPE
+from exo_env.ecosystem.person import HEIGHT_0, JOINT_TRAITS, MASS_0, SEXES, Person, Sex
 from exo_env.jit import compiled
 from exo_env.patient.motor_command import arm_table
-from exo_env.patient.patient import SEXES, Patient, Sex
+from exo_env.patient.patient import FIELDS, PATIENT
+from exo_env.places import places
+from exo_env.traits import range_of
+from exo_env.world.tables import DRAW, GIVEN, SCALING, WORLD
 
 TEMPLATE_ANGLE = 1.0
 """Elbow angle at which the elimination orders are chosen [rad], amid the exercise."""
-MONOMIALS = 10
+MONOMIALS = places((
+    "one", "height", "area", "mass", "inertia", "load", "force", "rise", "fall", "rate",
+    *JOINT_TRAITS,
+))  # fmt: skip
+"""Place of each monomial in phi."""
+SIZES = len(MONOMIALS) - len(JOINT_TRAITS)
+JOINT_PLACES = np.array([FIELDS.index(name) for name in JOINT_TRAITS], np.int64)
+"""Places of the traits of joints in a patient's row."""
 NOISE = 1e-12
 """Part of a number, relative to the largest of its kind, below which a coefficient is rounding."""
+LINEAR = 1e-9
+"""Relative error in the numbers of a further person up to which they count as linear in phi: rounding of ten equations
+whose condition is about 1e4, and a thousandth of a millimetre in a metre would be a thousand times more."""
 
 
 class Numbers(NamedTuple):
-    """Of a world, as far as they depend on who is in it and what is lifted."""
+    """Numbers of a world, as far as they depend on who is in it and what is lifted."""
 
     model: tuple[np.ndarray, ...]
     """As `Model.numbers`."""
@@ -44,9 +65,9 @@ class Numbers(NamedTuple):
     muscles: np.ndarray
     points: np.ndarray
     elbow: np.ndarray
-    """As in command_kernel.ArmTable."""
+    """As in static_optimisation.ArmTable."""
     forearm: np.ndarray
-    """Inertia about the elbow, mass, centre of mass and grip, as in command_kernel.LoadTable, shape (8,)."""
+    """Inertia about the elbow, mass, centre of mass and grip, as in static_optimisation.LoadTable, shape (8,)."""
 
 
 def declared(
@@ -70,7 +91,7 @@ def declared(
         activations: of the muscles at the start [-], shape (6,); default: the least.
         times: the muscles' time constants [s]; default: those of arm26.
     """
-    given = {} if activations is None else dict(zip(MUSCLES, map(float, activations), strict=True))
+    given = {} if activations is None else dict(zip(ecosystem.arm().muscles, map(float, activations), strict=True))
     return ecosystem.system(
         start,
         reference or Constant(value=start),
@@ -78,43 +99,88 @@ def declared(
         start_activation=given,
         muscle_times=times,
         device_forces=lambda worn: drive.forces(worn, held),
-        device_inputs=drive_inputs(drive, held),
+        device_inputs=drive.inputs(ecosystem.device, held),
     )
 
 
-@lru_cache(maxsize=8)
-def template(mode: str) -> Model:
-    """The model whose elimination orders all worlds of an action mode take over.
+def _template(ecosystem: Ecosystem, drive: Drive) -> Model:
+    return Model(declared(ecosystem, drive, TEMPLATE_ANGLE, drive.start(ecosystem.device, 0.0)))
+
+
+_of_default = lru_cache(maxsize=8)(_template)
+_of_structure = lru_cache(maxsize=8)(_template)
+
+
+def template(ecosystem: Ecosystem, drive: Drive) -> Model:
+    """The model whose elimination orders all worlds of the same elements take over.
 
     It is made of fixed numbers, never of the first patient, so that a seed gives the same bits whatever was simulated
-    before.
+    before: of the default ecosystem and drive where the elements are the same, or else of the given ones with a default
+    person and one kilogram.
     """
-    used = DRIVES[mode]()
-    return Model(declared(Ecosystem(), used, TEMPLATE_ANGLE, used.start(0.0)))
+    given = ecosystem.changed(person=Person(), weight=1.0)
+    try:
+        default = _of_default(type(ecosystem)(), type(drive)())
+    except InputError:
+        return _of_structure(given, drive)
+    own = Layout(declared(given, drive, TEMPLATE_ANGLE, drive.start(given.device, 0.0)))
+    return default if same_structure(default.layout, own) else _of_structure(given, drive)
 
 
 @compiled
-def put_monomials(body_mass, height, strength, weight, rise, fall, phi):
-    """Fill phi, shape (MONOMIALS,), with sizes as multiples of arm26's.
+def put_monomials(body_mass, height, strength, load, rise, fall, phi):
+    """Fill the first places of phi with sizes as multiples of arm26's.
 
     Args:
         body_mass: [kg].
         height: [m].
         strength: factor on every muscle's F0 [-].
-        weight: on the machine [kg].
+        load: on the machine [kg].
         rise: activation time constant [s].
         fall: deactivation time constant [s].
-        phi: filled.
+        phi: shape (len(MONOMIALS),); the traits of joints are not touched.
     """
     m, h = body_mass / MASS_0, height / HEIGHT_0
-    phi[0], phi[1], phi[2], phi[3], phi[4], phi[5] = 1.0, h, h * h, m, m * h * h, weight
-    phi[6], phi[7], phi[8], phi[9] = strength * m / h, 100.0 * rise, 100.0 * fall, 0.01 / min(rise, fall)
+    phi[MONOMIALS.one], phi[MONOMIALS.height], phi[MONOMIALS.area] = 1.0, h, h * h
+    phi[MONOMIALS.mass], phi[MONOMIALS.inertia], phi[MONOMIALS.load] = m, m * h * h, load
+    phi[MONOMIALS.force], phi[MONOMIALS.rise], phi[MONOMIALS.fall] = strength * m / h, 100.0 * rise, 100.0 * fall
+    phi[MONOMIALS.rate] = 0.01 / min(rise, fall)
 
 
-def monomials(person: Person, weight: float, times: dict[str, float]) -> np.ndarray:
-    """phi of a person, shape (MONOMIALS,); times: activation and deactivation time constants of ThelenMuscle [s]."""
-    phi = np.empty(MONOMIALS)
-    put_monomials(person.body_mass, person.height, person.strength, weight, *times.values(), phi)
+@compiled
+def put_numbers(w):
+    """Sizes of a patient, and the load, into the numbers of a world."""
+    scaling, draw = inner(w, WORLD.scaling), inner(w, WORLD.draw)
+    who, times, phi = floats(draw, DRAW.patient), floats(scaling, SCALING.constants), np.empty(len(MONOMIALS))
+    put_monomials(
+        who[PATIENT.body_mass], who[PATIENT.height], who[PATIENT.strength], floats(draw, DRAW.given)[GIVEN.load],
+        who[PATIENT.activation_time_scale] * times[0], who[PATIENT.deactivation_time_scale] * times[1], phi,
+    )  # fmt: skip
+    for k in range(JOINT_PLACES.shape[0]):
+        phi[SIZES + k] = who[JOINT_PLACES[k]]
+    C, x, targets = (
+        matrix(scaling, SCALING.coefficients),
+        floats(scaling, SCALING.numbers),
+        inner(scaling, SCALING.targets),
+    )
+    first, at = int(who[PATIENT.sex]) * x.shape[0], 0
+    for i in range(x.shape[0]):
+        total = 0.0
+        for j in range(phi.shape[0]):
+            total += C[first + i, j] * phi[j]
+        x[i] = total
+    for k in range(targets.shape[0]):
+        into = floats(targets, k)
+        for i in range(into.shape[0]):
+            into[i] = x[at + i]
+        at += into.shape[0]
+
+
+def monomials(person: Person, load: float, times: dict[str, float]) -> np.ndarray:
+    """phi of a person who lifts a load [kg]; times: activation and deactivation time constants of ThelenMuscle [s]."""
+    phi = np.empty(len(MONOMIALS))
+    put_monomials(person.body_mass, person.height, person.strength, load, *times.values(), phi)
+    phi[SIZES:] = [getattr(person, name) for name in JOINT_TRAITS]
     return phi
 
 
@@ -125,26 +191,20 @@ def numbers_of(model: Model, arm: Arm) -> Numbers:
     return Numbers(model.numbers, model.start.q, table.muscles, table.points, table.elbow, carried)
 
 
-class Fitting:
-    """The constants C of a device and a drive.
+class Scaling:
+    """The constants C of an ecosystem and a drive.
 
     Args:
-        ecosystem: device and machine; person and weight do not matter.
-        mode: action mode.
-        drive: of this mode.
+        ecosystem: device, machine and anatomy; person and weight do not matter.
+        drive: of the action mode.
     """
 
-    def __init__(self, ecosystem: Ecosystem, mode: str, drive: Drive) -> None:
-        self.ecosystem, self.mode, self.drive = ecosystem, mode, drive
+    def __init__(self, ecosystem: Ecosystem, drive: Drive) -> None:
+        self.ecosystem, self.drive, self.template = ecosystem, drive, template(ecosystem, drive)
         self._known, self._lock = set[str](), Lock()
         self._parts: list[tuple[int, int, tuple[int, ...]]] = []
-        self.both = np.zeros((0, MONOMIALS))
-        """C of men, then of women, as far as they were asked for, shape (2 n, MONOMIALS)."""
-
-    def numbers(self, patient: Patient, weight: float) -> Numbers:
-        """Of a patient who lifts a weight [kg]."""
-        C = self.coefficients(patient.sex)
-        return self.split(C @ monomials(patient.person, weight, patient.time_constants(Arm())))
+        self.both = np.zeros((0, len(MONOMIALS)))
+        """C of men, then of women, as far as they were asked for, shape (2 n, monomials)."""
 
     def split(self, x: np.ndarray) -> Numbers:
         """C phi, shape (n,), as views of its parts."""
@@ -153,37 +213,65 @@ class Fitting:
         return Numbers(tuple(parts[:count]), *parts[count:])
 
     def coefficients(self, sex: Sex) -> np.ndarray:
-        """C, shape (n, MONOMIALS)."""
+        """C, shape (n, monomials)."""
         with self._lock:
             if sex not in self._known:
                 C = self._found(sex)
                 if not self._known:
-                    self.both = np.zeros((len(SEXES) * len(C), MONOMIALS))
+                    self.both = np.zeros((len(SEXES) * len(C), len(MONOMIALS)))
                 self.both[SEXES.index(sex) * len(C) :][: len(C)] = C
                 self._known.add(sex)
         n = len(self.both) // len(SEXES)
         return self.both[SEXES.index(sex) * n :][:n]
 
     def _found(self, sex: Sex) -> np.ndarray:
-        """C, shape (numbers, MONOMIALS)."""
-        rng, rows, found = np.random.default_rng(0), [], []
-        for _ in range(MONOMIALS):
-            m, h, strength, weight, rise, fall = rng.uniform(
-                (0.5, 0.8, 0.5, 0.5, 0.8, 3.0), (2.0, 1.2, 2.0, 2.0, 8.0, 5.0)
-            )
-            person = Person(body_mass=m * MASS_0, height=h * HEIGHT_0, sex=sex, strength=strength)
-            times = {"activation_time_constant": 0.01 * rise, "deactivation_time_constant": 0.01 * fall}
-            joined = self.ecosystem.changed(person=person, weight=weight)
-            system = declared(joined, self.drive, TEMPLATE_ANGLE, self.drive.start(0.0), times=times)
-            given = numbers_of(Model(system, like=template(self.mode)), Arm(person))
-            parts = [*given.model, *given[1:]]
-            ends = np.cumsum([x.size for x in parts]).tolist()
-            self._parts = [(end - x.size, end, x.shape) for end, x in zip(ends, parts, strict=True)]
-            rows.append(monomials(person, weight, times))
-            found.append(np.concatenate([x.ravel() for x in parts]))
-        C = np.linalg.solve(np.array(rows), np.array(found)).T
-        return np.where(np.abs(C) > NOISE * np.abs(found).max(axis=0)[:, None], C, 0.0)
+        """C, shape (numbers, monomials), from as many persons as there are monomials, and checked by one more."""
+        sizes, joints = np.random.default_rng(0), np.random.default_rng(1)
+        rows, found = [], []
+        for _ in range(len(MONOMIALS) + 1):
+            phi, numbers = self._declared(sex, sizes, joints)
+            rows.append(phi)
+            found.append(numbers)
+        C = np.linalg.solve(np.array(rows[:-1]), np.array(found[:-1])).T
+        C = np.where(np.abs(C) > NOISE * np.abs(found[:-1]).max(axis=0)[:, None], C, 0.0)
+        self._check(C @ rows[-1], np.array(found[-1]), np.abs(found).max(axis=0))
+        return C
+
+    def _declared(
+        self, sex: Sex, sizes: np.random.Generator, joints: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """phi and all numbers of a random person."""
+        m, h, strength, load, rise, fall = sizes.uniform((0.5, 0.8, 0.5, 0.5, 0.8, 3.0), (2.0, 1.2, 2.0, 2.0, 8.0, 5.0))
+        traits = {name: joints.uniform(*range_of(Person, name)) for name in JOINT_TRAITS}
+        person = Person(body_mass=m * MASS_0, height=h * HEIGHT_0, sex=sex, strength=strength, **traits)
+        times = {"activation_time_constant": 0.01 * rise, "deactivation_time_constant": 0.01 * fall}
+        joined = self.ecosystem.changed(person=person, weight=load)
+        held = self.drive.start(joined.device, 0.0)
+        model = Model(declared(joined, self.drive, TEMPLATE_ANGLE, held, times=times), like=self.template)
+        given = numbers_of(model, joined.arm())
+        self._model, parts = model, [*given.model, *given[1:]]
+        ends = np.cumsum([x.size for x in parts]).tolist()
+        self._parts = [(end - x.size, end, x.shape) for end, x in zip(ends, parts, strict=True)]
+        return monomials(person, load, times), np.concatenate([x.ravel() for x in parts])
+
+    def _check(self, fitted: np.ndarray, numbers: np.ndarray, largest: np.ndarray) -> None:
+        """Refuses numbers of elements that are not linear in phi; rope and start are given by rest_pose.py.
+
+        Raises:
+            ModelError: names the element.
+        """
+        layout, names = self._model.layout, []
+        for calls in (layout.dynamics, layout.constraints):
+            names += [call.element.name for call in calls for _ in call.placement.numbers]
+        wrong = np.abs(fitted - numbers)[: len(names)] > LINEAR * np.maximum(largest[: len(names)], 1.0)
+        for k in np.flatnonzero(wrong).tolist():
+            if names[k] != ROPE:
+                raise ModelError(
+                    f"element '{names[k]}': a number of it, {numbers[k]:.6g} for one person, is not linear in the "
+                    f"person's sizes, the load and the traits of joints ({fitted[k]:.6g} if it were); an environment "
+                    "needs it to be (exo_env/world/scaling.py)."
+                )
 
 
-fitting = lru_cache(maxsize=16)(Fitting)
-"""Fittings made so far in this process; many worlds share one."""
+scaling_of = lru_cache(maxsize=16)(Scaling)
+"""The scaling of an ecosystem and a drive; many worlds share one."""

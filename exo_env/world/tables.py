@@ -1,66 +1,255 @@
-"""The arrays of a world and of what acts on it, put together for compiled code (control_period.py)."""
+"""The arrays of one world and of what acts on it, by owner, as compiled code is handed them.
+
+A world is one packed `WorldTables` w (dms_core/compiled/arena.py); kernels take views by name:
+
+    readings = floats(inner(w, WORLD.task), TASK.readings)
+
+Each field says whether a reset keeps or clears its array (clearing.py).
+"""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from dms_core.compiled.arena import Packed
-from dms_core.simulation.dynamics import World
-from exo_env.ecosystem.arm import MUSCLES
-from exo_env.patient.effort import state_size
-from exo_env.patient.patient import PATIENT
-from exo_env.tasks.limits import Limits
-from exo_env.tasks.observer import PREVIEW, TRUTH_SIZE, Observer
-from exo_env.tasks.rewards import TERMS, Weights
-from exo_env.world.control_period import READING, STATUS, Plant
+from dms_core.kernels import Packed, fields
+from exo_env.clearing import Cleared, Kept
+from exo_env.patient.effort import EffortState
+from exo_env.places import places
 
-SENSORS = (
-    "elbow_angle.angle", "elbow_angle.rate", "exo_angle.angle", "exo_angle.rate", "agonist_tension",
-    "antagonist_tension", "muscle_moment", "exo_moment", *(f"elbow_reaction.F{x}" for x in "xyz"),
-    *(f"guide_force.F{x}" for x in "xyz"), *(f"{m}.sensor.tendon_force" for m in MUSCLES),
-    *(f"{m}.sensor.activation" for m in MUSCLES),
+STATUS = places(("step", "code", "event"))
+"""Places in `WorldTables.status`: control periods done, code of the solver, event that ended the episode."""
+GIVEN = places(("load", "start", "phase"))
+"""Places in `DrawTables.given`: weight on the machine [kg], elbow angle and phase of the tremor at the start [rad]."""
+FELT = places(("angle", "rate"))
+"""Places in `PatientTables.felt`: angle [rad] and rate [rad/s] of the elbow."""
+OUTCOME = places(("ability", "left", "gap"))
+"""Places in `WorldTables.outcome`: ability [-], estimated error in an activation of the command [-], largest |phi| at
+the start [m or -]."""
+
+
+class DynamicsTables(NamedTuple):
+    """The differential-algebraic system and its sensors."""
+
+    model: Packed
+    state: Packed
+    sensing: Packed
+    options: Kept
+    """Options of the solver, in the order of `Options`."""
+    y: Cleared
+    """All sensors of the model."""
+
+
+class DriveTables(NamedTuple):
+    """From n_a actions to n_c commands; see drives/drive.py."""
+
+    kernel: Kept
+    """Address of the drive's kernel, shape (1,)."""
+    numbers: Kept
+    """What the kernel reads beside the action."""
+    steps: Kept
+    """Largest change of each command in a control period, shape (n_c,)."""
+    start: Kept
+    """What each command is at the start, and the most that it takes of the holding tension, shape (2, n_c)."""
+    motors: Kept
+    """Coordinate of each motor that follows a command, and the command's number, shape (k, 2)."""
+    rows: Kept
+    """Row of each command in the signals of the world, shape (n_c,)."""
+    axes: Kept
+    """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
+    action: Cleared
+    before: Cleared
+    """The action of the period before, shape (n_a,)."""
+    wanted: Cleared
+    """What the kernel wants each command to be at the end of the period, shape (n_c,)."""
+    commands: Cleared
+    """Reached at the end of the last period, shape (n_c,)."""
+
+
+class PatientTables(NamedTuple):
+    """Who is in the device; m muscles, k control times."""
+
+    traits: Cleared
+    """Numbers of the patient, at the places of PATIENT."""
+    effort: EffortState
+    wanted: Cleared
+    """Motor command at each control time, shape (k, m)."""
+    excitations: Cleared
+    felt: Cleared
+    """What the patient feels of the elbow, at the places of FELT."""
+    senses: Kept
+    """Their places in y."""
+    rows: Kept
+    """Row of each excitation in the signals of the world, shape (m,)."""
+
+
+class PlanTables(NamedTuple):
+    """What the patient intends to do, and what that needs."""
+
+    kernel: Kept
+    """Address of the movement's kernel, shape (1,)."""
+    movement: Cleared
+    """Numbers of the movement."""
+    starts: Kept
+    """Starts of the pieces of psi in the signals of the world [s]."""
+    coefficients: Kept
+    """Their coefficients, shape (n, 6)."""
+    course: Cleared
+    """psi, its rate and its acceleration at each control time, shape (k, 3)."""
+    horizons: Kept
+    """How far ahead the reference is shown [s]."""
+    preview: Cleared
+    """psi that far ahead at each control time, shape (k, n)."""
+    lacking: Cleared
+    """What the patient cannot give of the needed moment at each control time [Nm], shape (k,)."""
+    scale: Cleared
+    """Mean moment that is needed [Nm], shape (1,)."""
+
+
+class TaskTables(NamedTuple):
+    """What is read, rewarded and ended; see tasks/task.py."""
+
+    read: Kept
+    """Address of the kernel `read`, shape (1,)."""
+    judge: Kept
+    """Address of the kernel `judge`, shape (1,)."""
+    first: Kept
+    """Place of the first component of each reading, in the order of the task's readings, shape (n,)."""
+    source: Kept
+    """Places in y of the sensors that readings copy."""
+    target: Kept
+    """Their places in the readings."""
+    shown: Kept
+    """Place in the readings, and in a patient's row, of each trait that a reading shows, shape (k, 2)."""
+    numbers: Kept
+    """Limits, and what else the kernels read."""
+    weights: Kept
+    """Weight of each reward term."""
+    readings: Cleared
+    terms: Cleared
+    reward: Cleared
+    """Shape (1,)."""
+
+
+class ObserverTables(NamedTuple):
+    """What is observed, and how well; n components, k control times."""
+
+    columns: Kept
+    """Place of each component in the readings, shape (n,)."""
+    sensors: Kept
+    """Imperfections of each component, shape (n, 7); see tasks/noise.py."""
+    streams: Kept
+    """Random stream of each component's noise, as a signed number, shape (n,)."""
+    tremor: Cleared
+    """Standard normal numbers for the tremor, shape (k,)."""
+    noise: Cleared
+    """Standard normal numbers for each component, shape (k, n)."""
+    memory: Cleared
+    """Past readings, newest first, shape (depth, n)."""
+    observation: Cleared
+
+
+class DrawTables(NamedTuple):
+    """What was drawn for the episode that a reset begins."""
+
+    key: Kept
+    """Of the random streams, as a signed number, shape (1,)."""
+    patient: Kept
+    """Row of the patient."""
+    movement: Kept
+    """Numbers of the movement."""
+    given: Kept
+    """At the places of GIVEN."""
+
+
+class ScalingTables(NamedTuple):
+    """How the numbers of a world follow from a patient's sizes; see scaling.py."""
+
+    coefficients: Kept
+    """C for men, then for women, shape (2 n, monomials)."""
+    constants: Kept
+    """Time constants of activation and deactivation of a muscle [s], shape (2,)."""
+    numbers: Kept
+    """C phi: the numbers of the model, then those that follow, which are views of it, shape (n,)."""
+    targets: Kept
+    """Where the model's numbers lie: a table as of arena.py, shape (k, 3)."""
+    start: Kept
+    muscles: Kept
+    points: Kept
+    elbow: Kept
+    forearm: Kept
+
+
+class SubjectTables(NamedTuple):
+    """What of an arm and its load is the same for all patients; the rest is in ScalingTables."""
+
+    sign: Kept
+    first: Kept
+    moving: Kept
+    axis: Kept
+    """As in an ArmTable."""
+    gravity: Kept
+    handle: Kept
+    """Mass [kg], length [m], and distance of the centre of mass from the grip [m]."""
+    low_pulley: Kept
+    high_pulley: Kept
+    weight_height: Kept
+    """Height of the weight at the start [m], shape (1,)."""
+    link: Kept
+    """Mass and centre of mass of the lower link, shape (4,)."""
+    rope: Kept
+    """Ends of the rope that lifts, on upper and lower link [m], shape (2, 3)."""
+    times: Kept
+    """At which the command is planned [s]."""
+
+
+class RestTables(NamedTuple):
+    """Where the world is at rest; see rest_pose.py."""
+
+    orientation: Kept
+    """Euler parameters of both links where the hinge is at 0, shape (4,)."""
+    misaligned: Kept
+    """1 where the hinge axis is not that of the elbow, or 0, shape (1,)."""
+    shift: Kept
+    """From the elbow centre to the hinge, in ground axes [m]."""
+    guided: Kept
+    """Point that the guide leads, in the forearm's frame [m]."""
+    link_centre: Kept
+    """Centre of mass of the lower link in its frame [m], shape (3,)."""
+    places: Kept
+    """First coordinate of what moves, in the order of BODIES of rest_pose.py."""
+    fibres: Kept
+    """Coordinate of each muscle's fibre length, its activation behind it, shape (m,)."""
+    rope: Kept
+    """Place of the gym rope's length among the numbers of constraints, shape (1,)."""
+    v: Kept
+    """Rates at the start, 0 but for the controller's."""
+
+
+class WorldTables(NamedTuple):
+    """One world with all that acts in a control period and in a reset."""
+
+    dynamics: DynamicsTables
+    drive: DriveTables
+    patient: PatientTables
+    plan: PlanTables
+    task: TaskTables
+    observer: ObserverTables
+    draw: DrawTables
+    scaling: ScalingTables
+    subject: SubjectTables
+    rest: RestTables
+    period: Kept
+    """Control period [s], shape (1,)."""
+    cleared: Kept
+    """Address and number of 8-byte words of every array that a reset sets to zero, shape (n, 2)."""
+    status: Cleared
+    outcome: Cleared
+
+
+DYNAMICS, DRIVE, PATIENT_TABLES, PLAN, TASK, OBSERVER, DRAW, SCALING, SUBJECT, REST, WORLD, EFFORT = map(
+    fields,
+    (
+        DynamicsTables, DriveTables, PatientTables, PlanTables, TaskTables, ObserverTables, DrawTables, ScalingTables,
+        SubjectTables, RestTables, WorldTables, EffortState,
+    ),
 )  # fmt: skip
-"""What a control period reads, in the order of `Plant.places`."""
-
-
-def plant_of(
-    world: World,
-    names: dict[str, int],
-    inputs: np.ndarray,
-    *,
-    period: float,
-    times: np.ndarray,
-    drive: np.ndarray,
-    axes: np.ndarray,
-    observer: Observer,
-    weights: Weights,
-    limits: Limits,
-) -> Packed:
-    """A packed Plant without a patient.
-
-    Args:
-        world: the DAE.
-        names: place of each sensor's component in a reading.
-        inputs: rows of commands and excitations in the signals of the world, shape (8,).
-        period: control period [s].
-        times: control times [s], shape (k,).
-        drive: table of the drive, shape (2, 3).
-        axes: of the worn device, shape (3, 3).
-        observer: what is observed, and how well.
-        weights: of the reward.
-        limits: that end an episode.
-    """
-    k, n, zeros = len(times), observer.size, np.zeros
-    status = zeros(len(STATUS), np.int64)
-    status[STATUS.steps] = k - 1
-    return Packed(Plant(
-        model=world.tables, world=world.packed, sensing=world.model.sensing,
-        options=np.array(world.options.numbers(), float), patient=zeros(len(PATIENT)), effort=zeros(state_size(period)),
-        period=np.array([period]), wanted=zeros((k, len(MUSCLES))), course=zeros((k, 3)),
-        preview=zeros((k, len(PREVIEW))), lacking=zeros(k), scale=zeros(1), noise=zeros((k, 1 + n)), drive=drive,
-        commands=zeros(2), excitations=zeros(len(MUSCLES)), stretch=zeros(len(MUSCLES)), inputs=inputs, axes=axes,
-        places=np.array([names[name] for name in SENSORS], np.int64), y=zeros(len(names)), reading=zeros(len(READING)),
-        truth=zeros(TRUTH_SIZE), columns=observer.columns, sensors=observer.sensors, memory=observer.memory(),
-        observation=zeros(n), action=zeros(2), before=zeros(2), weights=weights.numbers(), limits=limits.numbers(),
-        terms=zeros(len(TERMS)), reward=zeros(1), status=status,
-    ))  # fmt: skip

@@ -15,7 +15,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from dms_core.compiled.arena import Packed
+from dms_core.kernels import Packed
 from exo_env.jit import compiled
 
 LINE = 64

@@ -1,7 +1,7 @@
-"""Device, gym machine and motors in which one patient after another takes place.
+"""The world of one environment: device, gym machine and drive, in which one patient after another takes place.
 
 An episode differs from the one before in numbers only. All arrays of the world and of what acts on it are made once,
-and filled anew for each patient (opening.py).
+and filled anew for each patient (reset.py).
 """
 
 from __future__ import annotations
@@ -10,195 +10,273 @@ import math
 
 import numpy as np
 
-from dms_core import Model, SolverOptions
-from dms_core.compiled.arena import Packed
-from dms_core.errors import SimulationError
+from dms_core import Model, SolverOptions, World
+from dms_core.errors import InputError, SimulationError
+from dms_core.kernels import TABLE_CALL, Packed, address
+from dms_core.model import MinimumJerk
 from dms_core.results import Result
-from dms_core.simulation.dynamics import World
-from exo_env.drives.drive import COMMANDS, Drive
-from exo_env.ecosystem.arm import MUSCLES, Arm, excitation_name
+from exo_env.clearing import cleared_areas
+from exo_env.drives.drive import Drive
+from exo_env.ecosystem.arm import excitation_name
 from exo_env.ecosystem.ecosystem import REFERENCE, Ecosystem
-from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST, LOWER, PID, WornExoskeleton
 from exo_env.ecosystem.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
+from exo_env.ecosystem.person import SEXES
+from exo_env.ecosystem.worn_exoskeleton import LOWER, PID
 from exo_env.patient.ability import Need
+from exo_env.patient.effort import new_effort
 from exo_env.patient.motor_command import arm_table, load_table, unsettled
-from exo_env.patient.patient import FIELDS, SEXES
-from exo_env.tasks.limits import Limits
-from exo_env.tasks.movement import MOVEMENT, Repetition
+from exo_env.patient.patient import FIELDS, PATIENT
+from exo_env.streams import stream
+from exo_env.tasks.channels import first_places
+from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
-from exo_env.tasks.rewards import Weights
-from exo_env.world.control_period import READING, Plant
-from exo_env.world.episode import Episode
-from exo_env.world.reset import (
-    FOUND,
-    GAPING,
+from exo_env.tasks.task import Task
+from exo_env.world.episode import Draw, Episode
+from exo_env.world.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
+from exo_env.world.scaling import TEMPLATE_ANGLE, declared, scaling_of
+from exo_env.world.tables import (
+    FELT,
     GIVEN,
-    NO_RATES,
-    OPEN,
-    PULLEY_IN_REACH,
-    UNSETTLED,
-    Setting,
-    open_episode,
-    settle,
+    OUTCOME,
+    STATUS,
+    DrawTables,
+    DriveTables,
+    DynamicsTables,
+    ObserverTables,
+    PatientTables,
+    PlanTables,
+    RestTables,
+    ScalingTables,
+    SubjectTables,
+    TaskTables,
+    WorldTables,
 )
-from exo_env.world.scaling import TEMPLATE_ANGLE, declared, fitting, template
-from exo_env.world.tables import plant_of
 
 PLANNING = 0.05
 """Interval of the motor command's table [s]; a tenth of it would change an activation by 0.002."""
+NAMES_AT_REST = ("forearm", LOWER, HANDLE, WEIGHT, PID)
+"""Elements whose first coordinates `RestTables.places` holds, in the order of rest_pose.MOVING."""
 
 
-class Rig:
+class PatientWorld:
     """The world of one environment.
 
     Args:
-        ecosystem: device and machine.
-        mode: action mode.
-        drive: of this mode.
+        ecosystem: device and machine; whose person and weight do not matter.
+        drive: from actions to commands.
+        task: what is read, rewarded and ended.
+        movement: what patients intend.
+        observer: what is observed, and how well.
         period: control period [s].
         duration: of an episode [s].
-        repetitions: of the movement in an episode.
-        observer: what is observed, and how well.
-        weights: of the reward.
-        limits: that end an episode.
+        steps: control periods of an episode.
         options: of the solver.
+
+    Raises:
+        InputError: the ecosystem has no gym machine, or the device does not fit the drive.
     """
 
     def __init__(
         self,
         ecosystem: Ecosystem,
-        mode: str,
         drive: Drive,
+        task: Task,
+        movement: Movement,
+        observer: Observer,
         *,
         period: float,
         duration: float,
-        repetitions: int,
-        observer: Observer,
-        weights: Weights,
-        limits: Limits,
+        steps: int,
         options: SolverOptions,
     ) -> None:
-        assert ecosystem.machine is not None
-        self.ecosystem, self.machine, self.drive = ecosystem, ecosystem.machine, drive
-        self.period, self.options, self.observer = period, options, observer
-        self.weights, self.limits = weights, limits
-        self.times = np.arange(round(duration / period) + 1) * period
-        self._fitting = fitting(ecosystem, mode, drive)
-        reference = Repetition(count=repetitions, every=duration / repetitions, rest=0.1).signal
-        held = drive.start(0.0)
-        system = declared(ecosystem, drive, TEMPLATE_ANGLE, held, reference=reference, activations=np.full(6, 0.1))
-        self.model = Model(system, like=template(mode))
+        if ecosystem.machine is None:
+            raise InputError("an environment needs a gym machine; this ecosystem has machine = None.")
+        self.ecosystem, self.machine, self.drive, self.task = ecosystem, ecosystem.machine, drive, task
+        self.movement, self.observer, self.options = movement, observer, options
+        self.period, self.duration = period, duration
+        self.times = np.arange(steps + 1) * period
+        """Control times [s], shape (k,)."""
+        self._arm, self._worn = ecosystem.arm(), ecosystem.worn()
+        self._scaling = scaling_of(ecosystem, drive)
+        held = drive.start(ecosystem.device, 0.0)
+        system = declared(
+            ecosystem, drive, TEMPLATE_ANGLE, held, reference=_pieces(movement.pieces),
+            activations=np.full(len(self._arm.muscles), 0.1),
+        )  # fmt: skip
+        self.model = Model(system, like=self._scaling.template)
         self.names = {name: k for k, (name, _) in enumerate(self.model.layout.outputs)}
-        worn = WornExoskeleton(ecosystem.device, Arm(), ecosystem.misalignment, ecosystem.guide)
-        self._axes = np.ascontiguousarray(worn.axes)
+        """Place of each sensor's component among the model's sensors."""
         self._build()
-        samples = math.ceil(duration / PLANNING) + 1
-        self.setting = Packed(self._setting(worn, np.linspace(0.0, duration, samples)))
-        movement = self.setting.values.movement
-        movement[MOVEMENT.often], movement[MOVEMENT.every] = repetitions, duration / repetitions
 
     def _build(self) -> None:
-        """World and plant; those of a world whose rows were ordered anew are not used again."""
-        self.world = World(self.model, self.options)
-        inputs = [*self.drive.inputs, *(excitation_name(m) for m in MUSCLES)]
-        rows = [self.world.state.signals.ptr[self.model.input_index(name)] for name in inputs]
-        self.packed = plant_of(
-            self.world, self.names, np.array(rows, np.int64), period=self.period, times=self.times,
-            drive=self.drive.table(self.period), axes=self._axes, observer=self.observer, weights=self.weights,
-            limits=self.limits,
+        """World and tables; those of a world whose rows were ordered anew are not used again."""
+        self.dynamics = World(self.model, self.options)
+        values = WorldTables(
+            dynamics=self._dynamics(), drive=self._drive(), patient=self._patient(), plan=self._plan(),
+            task=self._task(), observer=self._observer(), draw=self._draw(), scaling=self._scaled(),
+            subject=self._subject(), rest=self._rest(), period=np.array([self.period]),
+            cleared=np.zeros((0, 2), np.int64), status=np.zeros(len(STATUS), np.int64), outcome=np.zeros(len(OUTCOME)),
         )  # fmt: skip
-        self.plant: Plant = self.packed.values
+        self.tables = values._replace(cleared=cleared_areas(values))
+        self.packed = Packed(self.tables)
 
-    def follow_world(self) -> None:
-        """Take over the tables and arrays of a world that has ordered its equations anew."""
-        self.plant = self.plant._replace(model=self.world.tables, world=self.world.packed)
-        self.packed = Packed(self.plant)
+    def follow_dynamics(self) -> None:
+        """Take over the tables and arrays of equations that were ordered anew."""
+        dynamics = self.tables.dynamics._replace(model=self.dynamics.tables, state=self.dynamics.packed)
+        self.tables = self.tables._replace(dynamics=dynamics)
+        self.packed = Packed(self.tables)
 
-    def _setting(self, worn: WornExoskeleton, times: np.ndarray) -> Setting:
-        """What an opening reads, without a patient."""
-        machine, layout, signals = self.machine, self.model.layout, self.world.state.signals
-        at, k, device = layout.offset, self.model.input_index(REFERENCE), worn.device
-        arm, load, n = arm_table(Arm()), load_table(Arm(), machine, 1.0), len(self._fitting.coefficients(SEXES[0]))
-        numbers, defaults = np.zeros(n), Arm().facts["muscle_defaults"]
-        parts = self._fitting.split(numbers)
-        motors = {name: f"{side}_motor" for name, side in zip(COMMANDS, (AGONIST, ANTAGONIST), strict=True)}
-        follow = [(at[motors[name]], i) for i, name in enumerate(self.drive.inputs) if name in motors]
-        calls, ropes = self.model.tables.values.constraints, [c.element.name for c in layout.constraints]
-        return Setting(
-            patient=np.zeros(len(FIELDS)), movement=np.zeros(len(MOVEMENT)), given=np.zeros(len(GIVEN)),
-            found=np.zeros(len(FOUND)), coefficients=self._fitting.both,
-            constants=np.array([defaults[f"{way}_time_constant"] for way in ("activation", "deactivation")]),
-            numbers=numbers, start=parts.start, muscles=parts.muscles, points=parts.points, elbow=parts.elbow,
-            forearm=parts.forearm, targets=_table_of(self.model.numbers), rope=calls.par_ptr[[ropes.index(ROPE)]],
-            first=arm.first, moving=arm.moving, axis=arm.axis, gravity=load.gravity, link=worn.orientation,
-            link_centre=np.array(device.lower_link.centre_of_mass),
-            handle=np.array([machine.handle.mass, machine.handle.length, machine.handle.centre_of_mass]),
+    def _row(self, name: str) -> int:
+        """Row of a constant input in the signals of the world."""
+        return int(self.dynamics.state.signals.ptr[self.model.input_index(name)])
+
+    def _dynamics(self) -> DynamicsTables:
+        options = np.array(self.options.numbers(), float)
+        world = self.dynamics
+        return DynamicsTables(world.tables, world.packed, self.model.sensing, options, np.zeros(len(self.names)))
+
+    def _drive(self) -> DriveTables:
+        device, at = self.ecosystem.device, self.model.layout.offset
+        commands, actions = self.drive.commands(device), self.drive.actions(device)
+        motors = [(at[c.motor], i) for i, c in enumerate(commands) if c.motor is not None]
+        n = len(commands)
+        return DriveTables(
+            kernel=_address(self.drive.kernel), numbers=np.ascontiguousarray(self.drive.numbers(device)),
+            steps=np.array([c.rate for c in commands]) * self.period, start=self.drive.start_table(device),
+            motors=np.array(motors, np.int64).reshape(-1, 2),
+            rows=np.array([self._row(c.name) for c in commands], np.int64),
+            axes=np.ascontiguousarray(self._worn.frame), action=np.zeros(len(actions)), before=np.zeros(len(actions)),
+            wanted=np.zeros(n), commands=np.zeros(n),
+        )  # fmt: skip
+
+    def _patient(self) -> PatientTables:
+        muscles = self._arm.muscles
+        senses = [self.names[f"elbow_angle.{name}"] for name in FELT._fields]
+        return PatientTables(
+            traits=np.zeros(len(FIELDS)), effort=new_effort(self._arm.signs, self.period),
+            wanted=np.zeros((len(self.times), len(muscles))), excitations=np.zeros(len(muscles)),
+            felt=np.zeros(len(FELT)), senses=np.array(senses, np.int64),
+            rows=np.array([self._row(excitation_name(m)) for m in muscles], np.int64),
+        )  # fmt: skip
+
+    def _plan(self) -> PlanTables:
+        signals, k, n = self.dynamics.state.signals, self.model.input_index(REFERENCE), len(self.times)
+        first, end = int(signals.ptr[k]), int(signals.ptr[k + 1])
+        numbers = len(self.movement.names) + len(self.movement.episode_numbers(self.duration))
+        return PlanTables(
+            kernel=_address(self.movement.kernel), movement=np.zeros(numbers), starts=signals.t[first:end],
+            coefficients=signals.c[first:end], course=np.zeros((n, 3)), horizons=np.array(self.task.preview, float),
+            preview=np.zeros((n, len(self.task.preview))), lacking=np.zeros(n), scale=np.zeros(1),
+        )  # fmt: skip
+
+    def _task(self) -> TaskTables:
+        task = self.task
+        first = first_places(task.readings)
+        copied = [(self.names[s], first[i] + j) for i, r in enumerate(task.readings) for j, s in enumerate(r.sensors)]
+        shown = [(first[i], FIELDS.index(r.trait)) for i, r in enumerate(task.readings) if r.trait is not None]
+        source, target = np.array(copied, np.int64).reshape(-1, 2).T
+        return TaskTables(
+            read=_address(task.read), judge=_address(task.judge), first=first, source=source.copy(),
+            target=target.copy(), shown=np.array(shown, np.int64).reshape(-1, 2), numbers=task.numbers(),
+            weights=task.weight_numbers(), readings=np.zeros(int(first[-1])), terms=np.zeros(len(task.terms)),
+            reward=np.zeros(1),
+        )  # fmt: skip
+
+    def _observer(self) -> ObserverTables:
+        o, k = self.observer, len(self.times)
+        return ObserverTables(
+            columns=o.columns, sensors=o.sensors, streams=np.array([stream("tremor"), *o.streams]).view(np.int64),
+            tremor=np.zeros(k), noise=np.zeros((k, o.size)), memory=o.memory(), observation=np.zeros(o.size),
+        )  # fmt: skip
+
+    def _draw(self) -> DrawTables:
+        numbers = len(self.movement.names) + len(self.movement.episode_numbers(self.duration))
+        return DrawTables(np.zeros(1, np.int64), np.zeros(len(FIELDS)), np.zeros(numbers), np.zeros(len(GIVEN)))
+
+    def _scaled(self) -> ScalingTables:
+        numbers, defaults = np.zeros(len(self._scaling.coefficients(SEXES[0]))), self._arm.facts["muscle_defaults"]
+        parts = self._scaling.split(numbers)
+        constants = [defaults[f"{way}_time_constant"] for way in ("activation", "deactivation")]
+        targets = np.array([(x.ctypes.data, x.size, 1) for x in self.model.numbers], np.int64)
+        return ScalingTables(
+            self._scaling.both, np.array(constants), numbers, targets, parts.start, parts.muscles, parts.points,
+            parts.elbow, parts.forearm,
+        )  # fmt: skip
+
+    def _subject(self) -> SubjectTables:
+        arm, machine, device = arm_table(self._arm), self.machine, self.ecosystem.device
+        gravity, rope = load_table(self._arm, machine, 1.0).gravity, device.ropes[device.lifting_rope]
+        handle, duration = machine.handle, self.duration
+        return SubjectTables(
+            sign=arm.sign, first=arm.first, moving=arm.moving, axis=arm.axis, gravity=gravity,
+            handle=np.array([handle.mass, handle.length, handle.centre_of_mass]),
             low_pulley=np.array(machine.low_pulley), high_pulley=np.array(machine.high_pulley),
-            weight_height=np.array([machine.weight_start]), lower_link=device.lower_link.numbers(),
-            agonist=np.array([device.agonist.upper, device.agonist.lower]), holding=self.drive.holding(),
-            motors=np.array(follow, np.int64).reshape(-1, 2),
-            places=np.array([at[name] for name in ("forearm", LOWER, HANDLE, WEIGHT, PID)]),
-            fibres=np.array([at[m] for m in MUSCLES]), reference=signals.ptr[k : k + 2].astype(np.int64), times=times,
-            v=np.zeros(self.model.n_q),
+            weight_height=np.array([machine.weight_start]), link=device.lower_link.numbers(),
+            rope=np.array([rope.upper, rope.lower]),
+            times=np.linspace(0.0, duration, math.ceil(duration / PLANNING) + 1),
         )  # fmt: skip
 
-    def prepare(
-        self, patient: np.ndarray, load: float, movement: np.ndarray, start: float, generator: np.random.Generator
-    ) -> None:
-        """Say who comes next, for `open_episode` with `packed` and `setting`.
+    def _rest(self) -> RestTables:
+        at, calls = self.model.layout.offset, self.model.tables.values.constraints
+        joints = [c.element.name for c in self.model.layout.constraints]
+        return RestTables(
+            orientation=self._worn.orientation, misaligned=np.array([int(not self._worn.aligned)]),
+            shift=np.ascontiguousarray(self._worn.shift), guided=np.ascontiguousarray(self._worn.guided_point),
+            link_centre=np.array(self.ecosystem.device.lower_link.centre_of_mass),
+            places=np.array([at[name] for name in NAMES_AT_REST]), fibres=np.array([at[m] for m in self._arm.muscles]),
+            rope=calls.par_ptr[[joints.index(ROPE)]], v=np.zeros(self.model.n_q),
+        )  # fmt: skip
 
-        Args:
-            patient: row of numbers in the order of FIELDS.
-            load: weight on the machine [kg].
-            movement: the first five numbers of MOVEMENT.
-            start: elbow angle [rad].
-            generator: of the environment; tremor and noise of the whole episode are drawn here.
-        """
-        if self.world.tables is not self.model.tables:
+    def prepare(self, draw: Draw) -> None:
+        """Say who comes next, for `begin_episode`."""
+        if self.dynamics.tables is not self.model.tables:
             self._build()
-        setting: Setting = self.setting.values
-        self._fitting.coefficients(SEXES[int(patient[FIELDS.index("sex")])])
-        setting.patient[:], setting.movement[: len(movement)] = patient, movement
-        setting.given[GIVEN.weight], setting.given[GIVEN.angle] = load, start
-        setting.given[GIVEN.phase] = generator.uniform(0.0, 2.0 * math.pi)
-        generator.standard_normal(out=self.plant.noise)
+        into = self.tables.draw
+        self._scaling.coefficients(SEXES[int(draw.patient[PATIENT.sex])])
+        into.key[:] = np.uint64(draw.key).view(np.int64)
+        into.patient[:], into.movement[:] = draw.patient, draw.movement
+        into.given[:] = draw.load, draw.start, draw.phase
 
-    def open(self) -> int:
+    def begin(self) -> int:
         """Compiled part of an episode's begin; gives what came of it."""
-        return open_episode(self.packed.table, self.setting.table)
+        return begin_episode(self.packed.table)
 
-    def opened(self, code: int) -> Episode:
-        """The patient at rest at the start of a movement, where an opening gave that code.
+    def begun(self, code: int) -> Episode:
+        """The patient at rest at the start of a movement, where the compiled part gave that code.
 
         Raises:
             InputError: the arm could bring the rope's end to a pulley.
             SimulationError: no consistent start was found.
         """
-        setting: Setting = self.setting.values
-        found = setting.found
-        if code == NO_RATES and self.world.reorder():
-            # The orders of elimination were chosen elsewhere; a straight elbow wants others.
-            self.follow_world()
-            code = settle(self.packed.table, self.setting.table)
+        outcome = self.tables.outcome
+        if code == NO_RATES and self.dynamics.reorder():
+            # The orders of elimination were chosen elsewhere; a straight elbow needs others.
+            self.follow_dynamics()
+            code = settle(self.packed.table)
         if code == PULLEY_IN_REACH:
-            raise reach_error(self.machine, setting.elbow, setting.forearm[5:])
+            raise reach_error(self.machine, self.tables.scaling.elbow, self.tables.scaling.forearm[5:])
         if code == UNSETTLED:
-            raise unsettled(float(found[FOUND.left]), float(self.times[-1]))
+            raise unsettled(float(outcome[OUTCOME.left]), float(self.times[-1]))
         if code == NO_RATES:
             raise SimulationError(f"{Result.RATES_FAILED.value} (at the start of an episode)")
         if code == GAPING:
             raise SimulationError(
-                f"the joints stay open by {found[FOUND.gap]:.3g} (m or -) at the start of an episode."
+                f"the joints stay open by {outcome[OUTCOME.gap]:.3g} (m or -) at the start of an episode."
             )
-        assert code == OPEN
-        self.world.result = Result.SUCCESS
-        need = Need(float(found[FOUND.ability]), self.plant.lacking.copy(), float(self.plant.scale[0]))
-        start = float(self.plant.reading[READING.angle])
-        return Episode(
-            self, setting.patient.copy(), float(setting.given[GIVEN.weight]), setting.movement.copy(), need, start
-        )
+        assert code == BEGUN
+        self.dynamics.result = Result.SUCCESS
+        plan, draw = self.tables.plan, self.tables.draw
+        need = Need(float(outcome[OUTCOME.ability]), plan.lacking.copy(), float(plan.scale[0]))
+        load, start, phase = draw.given.tolist()
+        drawn = Draw(int(draw.key.view(np.uint64)[0]), draw.patient.copy(), load, draw.movement.copy(), start, phase)
+        return Episode(self, drawn, need)
 
 
-def _table_of(arrays: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Where arrays of floats lie, as a table that arena.py reads."""
-    return np.array([(x.ctypes.data, x.size, 1) for x in arrays], np.int64)
+def _address(kernel: object) -> np.ndarray:
+    """Address of a compiled function of one packed table, shape (1,)."""
+    return np.array([address(kernel, TABLE_CALL)], np.int64)
+
+
+def _pieces(count: int) -> MinimumJerk:
+    """A signal of that many pieces, at least 3; a movement's kernel fills them."""
+    return MinimumJerk(times=tuple(map(float, range(count - 1))), values=(TEMPLATE_ANGLE,) * (count - 1))

@@ -25,7 +25,7 @@ SECTIONS = {
 def content(algorithm="ppo", training=None, **changes):
     """Content of a configuration file."""
     section = {**SECTIONS[algorithm], "env_kwargs": dict(ENV_KWARGS), **changes}
-    return {"exo/ElbowLift-v0": section, "training": {"algorithm": algorithm, **TRAINING, **(training or {})}}
+    return {"exo/ElbowLift-v1": section, "training": {"algorithm": algorithm, **TRAINING, **(training or {})}}
 
 
 def config_file(folder: Path, algorithm="ppo", training=None, **changes) -> Path:

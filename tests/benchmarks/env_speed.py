@@ -1,4 +1,4 @@
-"""Control periods of exo/ElbowLift-v0 per second at 50 Hz, resets included, as ratios to MyoSuite's exoskeleton elbow.
+"""Control periods of exo/ElbowLift-v1 per second at 50 Hz, resets included, as ratios to MyoSuite's exoskeleton elbow.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/env_speed.py
 
@@ -23,8 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.peer_table import MEASURED, PeerTable

@@ -30,7 +30,7 @@ from dms_core.model import Revolute, ThelenMuscle
 from dms_core.model.signals import Constant
 from exo_env.ecosystem.arm import MUSCLES
 from exo_env.ecosystem.bare_arm import bare_arm
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.env_speed import actions_of

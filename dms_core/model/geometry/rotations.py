@@ -160,3 +160,10 @@ def add_cross_hessian(H, q, oi, si, oj, sj, factor):
             h = factor * dot(ci[k], cj[m])
             H[oi + 3 + k, oj + 3 + m] += h
             H[oj + 3 + m, oi + 3 + k] += h
+
+
+@compiled
+def turned(n, c, s, x):
+    """A triple x turned about the unit triple n by an angle with cosine c and sine s (Rodrigues' formula)."""
+    w, along = cross(n, x), (1.0 - c) * dot(n, x)
+    return c * x[0] + s * w[0] + along * n[0], c * x[1] + s * w[1] + along * n[1], c * x[2] + s * w[2] + along * n[2]

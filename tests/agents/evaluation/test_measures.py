@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents.evaluation.measures import READ, Record, measured, positive_work, smoothness, sparc
-from exo_env.tasks.movement import Repetition
+from exo_env.tasks.repetition import Repetition
 
 FREQUENCY = 100.0
 

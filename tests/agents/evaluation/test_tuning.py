@@ -117,7 +117,7 @@ def test_yielding_pid_acts_as_its_numbers_say():
     import gymnasium
 
     used = YieldingPid(authority=0.3, lag_deg=2.0)
-    env = gymnasium.make("exo_env:exo/ElbowLift-v0", action_mode="pid_setpoint")
+    env = gymnasium.make("exo_env:exo/ElbowLift-v1", action_mode="pid_setpoint")
     observation, info = env.reset(seed=0)
     used.reset(env)
     np.testing.assert_allclose(used(observation, info), [-np.radians(2.0) / 0.2, -0.4], rtol=1e-12)

@@ -130,12 +130,12 @@ def test_safetensors_are_those_of_the_package(tmp_path):
 
 def made(tmp_path, **changes):
     """A policy of random numbers, without PyTorch."""
-    env = gymnasium.make("exo_env:exo/ElbowLift-v0", patient="stroke_mild")
+    env = gymnasium.make("exo_env:exo/ElbowLift-v1", patient="stroke_mild")
     shape = Architecture(inputs=12, hidden=(5,), activation="tanh", output="clip", normalised=True)
     generator = np.random.default_rng(0)
     arrays = {k: generator.uniform(0.1, 1.0, s) for k, s in shape.shapes().items()}
     description = Description(
-        title="made", algorithm="ppo", environment="exo/ElbowLift-v0", exo_env="0", env_kwargs={}, steps=0,
+        title="made", algorithm="ppo", environment="exo/ElbowLift-v1", exo_env="0", env_kwargs={}, steps=0,
         architecture=shape, **{**world_facts(env), **changes},
     )  # fmt: skip
     LearnedPolicy(description, arrays).save(tmp_path / "policy")
@@ -157,7 +157,7 @@ def test_evaluation_of_a_run_is_that_of_its_training(trained):
 
     run = trained("ppo")
     policy = find_policy(str(run.folder.path))
-    env = gymnasium.make("exo_env:exo/ElbowLift-v0", disable_env_checker=True, **run.config.env_kwargs)
+    env = gymnasium.make("exo_env:exo/ElbowLift-v1", disable_env_checker=True, **run.config.env_kwargs)
     best = max(e["return"] for e in run.evaluations)
     assert episode(env, policy, run.seeds[0])["measures"]["return"] == pytest.approx(best, rel=1e-12)
 

@@ -18,7 +18,7 @@ from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
 def made(used, seed=0, **settings):
     """An environment for a policy, reset for both."""
     env = gymnasium.make(
-        "exo_env:exo/ElbowLift-v0", action_mode=used.action_mode, observation=list(used.observation), noise=False,
+        "exo_env:exo/ElbowLift-v1", action_mode=used.action_mode, observation=list(used.observation), noise=False,
         episode_duration=1.0, **settings,
     )  # fmt: skip
     observation, info = env.reset(seed=seed)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dms_core.errors import InputError
-from exo_env.ecosystem.arm import HEIGHT_0, MASS_0, MUSCLES, Arm, Person
+from exo_env.ecosystem.arm import Arm
+from exo_env.ecosystem.person import HEIGHT_0, MASS_0, Person
 from tests.arm26 import subject, table
 
 EXACT = 1e-12
@@ -15,7 +16,7 @@ EXACT = 1e-12
 
 @pytest.mark.parametrize("row", table("arm26_paths_via_points_only"), ids=lambda r: f"{r['elbow_flexion_deg']:.0f}deg")
 def test_lengths_and_moment_arms_of_the_internal_model(row):
-    for m in MUSCLES:
+    for m in Arm().muscles:
         length, arm = Arm().muscle_geometry(m, math.radians(row["elbow_flexion_deg"]))
         # 1e-9 m is what the reference asks for.
         assert length == pytest.approx(row[f"{m}_length_m"], abs=1e-9)
@@ -38,7 +39,7 @@ def test_the_default_person_is_arm26():
         assert segment.mass == body["mass"]
         np.testing.assert_array_equal(segment.centre_of_mass, body["centre_of_mass"])
         np.testing.assert_array_equal(segment.inertia, body["inertia"])
-    for m in MUSCLES:
+    for m in Arm().muscles:
         muscle = Arm().muscle(m)
         for key in ("max_isometric_force", "optimal_fibre_length", "tendon_slack_length"):
             assert getattr(muscle, key) == facts["muscles"][m][key]
@@ -50,7 +51,7 @@ def test_a_taller_and_heavier_person():
     assert arm.segments["forearm"].mass == pytest.approx(f * Arm().segments["forearm"].mass, rel=EXACT)
     # J about the elbow: mass times length squared.
     assert arm.inertia_about_elbow() == pytest.approx(f * k * k * Arm().inertia_about_elbow(), rel=EXACT)
-    for m in MUSCLES:
+    for m in Arm().muscles:
         muscle, before = arm.muscle(m), Arm().muscle(m)
         assert muscle.optimal_fibre_length == pytest.approx(k * before.optimal_fibre_length, rel=EXACT)
         assert muscle.tendon_slack_length == pytest.approx(k * before.tendon_slack_length, rel=EXACT)

@@ -10,7 +10,8 @@ from dms_core.errors import InputError
 from dms_core.model import Constant
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.ecosystem.exoskeleton import Exoskeleton, Misalignment
+from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.worn_exoskeleton import Misalignment
 from exo_env.paper.scenarios import build, load_scenarios
 
 START = math.radians(20.0)
@@ -74,7 +75,7 @@ def test_the_moment_arm_is_that_of_the_system(device, rope):
 
 
 def _length(device: Exoskeleton, rope: str, angle: float) -> float:
-    ends = getattr(device, rope)
+    ends = device.ropes[rope]
     turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
     return float(np.linalg.norm(turn @ ends.lower - np.array(ends.upper)))
 

@@ -5,7 +5,8 @@ import re
 
 import pytest
 
-from exo_env.drives.drive import PidSetpoint, RopeTension
+from exo_env.drives.pid_setpoint import PidSetpoint
+from exo_env.drives.rope_tension import RopeTension
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.tasks.rewards import Weights
 
@@ -33,8 +34,8 @@ def test_it_has_the_sections_of_the_template():
 )
 def test_actions(table, mode, drive):
     env, rows = ElbowLiftEnv(action_mode=mode), _tables("Action Space")[table]
-    assert [row[1] for row in rows] == list(drive.names)
-    offset, gain, _ = drive.table(0.02).T
+    assert [row[1] for row in rows] == list(drive.actions(env.ecosystem.device))
+    offset, gain = drive.numbers(env.ecosystem.device).T
     low, high = offset - gain, offset + gain
     for k, (_, _, least, most, control_least, control_most, _) in enumerate(rows):
         assert (env.action_space.low[k], env.action_space.high[k]) == (float(least), float(most))
@@ -71,13 +72,15 @@ def test_rewards():
 
 
 def test_arguments():
-    parameters = dict(inspect.signature(ElbowLiftEnv).parameters)
-    # What takes unknown ones to refuse them.
-    assert parameters.pop("unknown").kind is inspect.Parameter.VAR_KEYWORD
-    assert [row[0].strip("`") for row in _tables("Arguments")[0]] == list(parameters)
-    assert all(p.kind is inspect.Parameter.KEYWORD_ONLY for p in parameters.values())
-    for name, default, _ in _tables("Arguments")[0]:
-        wanted = parameters[name.strip("`")].default
-        if name != "`load`":
-            said = eval(default.strip("`"))  # noqa: S307  our own page
-            assert (list(wanted) if isinstance(wanted, tuple) else wanted) == said, name
+    fields, rows = ElbowLiftEnv.settings_type.model_fields, _tables("Arguments")[0]
+    assert [row[0].strip("`") for row in rows] == list(fields)
+    for name, default, _ in rows:
+        known = fields[name.strip("`")].default
+        said = eval(default.strip("`"))  # noqa: S307  our own page
+        assert (list(known) if isinstance(known, tuple) else known) == said, name
+
+
+def test_summary_names_terms_channels_and_actions():
+    said = ElbowLiftEnv(observation=["device", "privileged.load"]).summary()
+    for words in ("tracking", "0.75", "device.preview", "7-9", "privileged.load", "agonist tension", "solver"):
+        assert words in said, said

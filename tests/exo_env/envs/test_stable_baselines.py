@@ -7,10 +7,10 @@ import warnings
 import numpy as np
 import pytest
 
-from exo_env.drives.drive import DRIVES
+from exo_env.envs.elbow_lift import ElbowLiftEnv
 
 
-@pytest.mark.parametrize("mode", list(DRIVES))
+@pytest.mark.parametrize("mode", list(ElbowLiftEnv.drives))
 @pytest.mark.parametrize("groups", [["device"], ["privileged", "emg", "device"]])
 def test_checker_finds_nothing(make, mode, groups):
     from stable_baselines3.common.env_checker import check_env

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv
 
-ID, SETTINGS = "exo_env:exo/ElbowLift-v0", {"episode_duration": 0.1, "observation": ["device", "emg"]}
+ID, SETTINGS = "exo_env:exo/ElbowLift-v1", {"episode_duration": 0.1, "observation": ["device", "emg"]}
 SEEDS, STEPS = [4, 5], 12
 ACTIONS = np.random.default_rng(0).uniform(-1.0, 1.0, (STEPS, len(SEEDS), 2)).astype(np.float32)
 

@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from dms_core import simulate
 from dms_core.errors import InputError, SimulationError
-from exo_env.ecosystem.arm import MUSCLES, Arm
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem, Proprioception
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine
@@ -60,7 +60,7 @@ def test_the_command_holds_the_arm_at_rest(command, time):
     arm, k = Arm(), int(np.argmin(np.abs(command.times - time)))
     psi = exercise.course(command.times[k])[0]
     moment = 0.0
-    for a, m in zip(command.activations[k], MUSCLES, strict=True):
+    for a, m in zip(command.activations[k], command.muscles, strict=True):
         length, lever = arm.muscle_geometry(m, psi)
         muscle = arm.muscle(m)
         moment += lever * muscle.tension(length, muscle.equilibrium(length, a))

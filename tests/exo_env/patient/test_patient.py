@@ -7,11 +7,12 @@ import pytest
 
 from dms_core.errors import InputError
 from dms_core.yaml_text import read_yaml
-from exo_env.ecosystem.arm import Arm, Person
-from exo_env.patient.patient import LONGEST_DELAY, PATIENT, Patient
+from exo_env.ecosystem.arm import Arm
+from exo_env.ecosystem.person import Person
+from exo_env.patient.patient import LONGEST_DELAY, PATIENT, SHOWN, Patient
+from exo_env.traits import traits_of
 
 UNITS = ("[kg]", "[m]", "[-]", "[s]", "[s/rad]", "[rad/s]", "[Hz]", "[1/s]", "[rad]", "[1/(s rad)]", "[1/rad]")
-ONLY_IN_MUSCLES = {"body_mass", "height", "sex", "strength", "activation_time_scale", "deactivation_time_scale"}
 IMPAIRED = {
     "sex": "female",
     "height": 1.6,
@@ -46,12 +47,14 @@ def test_json_and_yaml_and_back(tmp_path):
     assert Patient(**read_yaml(tmp_path / "patient.yaml")) == patient
 
 
-def test_row_of_numbers_holds_every_field_that_is_not_in_the_muscles():
-    assert tuple(PATIENT) == tuple(range(len(PATIENT)))
-    assert set(PATIENT._fields) == Patient.model_fields.keys() - ONLY_IN_MUSCLES - {"expected_load"}
-    numbers = Patient(**IMPAIRED).numbers()
-    for name, index in PATIENT._asdict().items():
-        assert numbers[index] == getattr(Patient(**IMPAIRED), name)
+def test_every_field_has_a_place_in_the_row_and_says_where_it_acts():
+    assert PATIENT._fields == tuple(Patient.model_fields)
+    patient = Patient(**IMPAIRED).changed(sex="female")
+    for name, place in PATIENT._asdict().items():
+        assert patient.row()[place] == (1.0 if name == "sex" else getattr(patient, name))
+    acting = traits_of(Patient, "size", "muscle", "effort", "plan", "joint")
+    assert set(acting) == Patient.model_fields.keys() - {"sex"}
+    assert set(SHOWN) == set(acting) - set(traits_of(Patient, "muscle"))
 
 
 @pytest.mark.parametrize("name", [n for n in Patient.model_fields if n != "sex"])
@@ -98,4 +101,4 @@ def test_patient_is_frozen():
     with pytest.raises(Exception, match="frozen"):
         Patient().height = 1.8
     assert Patient().changed(height=1.8).height == 1.8
-    assert not np.isnan(Patient().numbers()).any()
+    assert not np.isnan(Patient().row()).any()

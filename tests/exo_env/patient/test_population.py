@@ -168,7 +168,7 @@ def test_own_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("fields: {height: 1.7}", "missing body_mass, sex"),
+        ("fields: {height: 1.7}", "body_mass, sex, .* are missing.*base: healthy.*without 'fields'"),
         ("base: healthy\nfields: {heigth: 1.7}", "unknown key 'heigth'.*height"),
         ("base: healthy\nfields: {height: 3.0}", "height reaches 3.0"),
         ("base: healthy\nfields: {height: {uniform: [1.6, 2.9]}}", "height reaches 2.9"),
@@ -191,6 +191,8 @@ def test_own_file(tmp_path):
         ("mixture: {healthy: 1}\nfields: {height: 1.7}", "either fields"),
         ("title: nobody", "either fields"),
         ("colour: red", "unknown key 'colour'"),
+        ("strength: 0.7\nfields: {height: 1.7}", "unknown key 'strength'"),
+        ("strength: 70", "strength = 70"),
         ("fields: [", "not valid YAML"),
     ],
 )
@@ -210,3 +212,27 @@ def test_unknown_population_lists_the_shipped(source):
 def test_patient_given_as_a_mapping_is_checked():
     with pytest.raises(InputError, match="height = 9"):
         population({"height": 9.0})
+
+
+def test_a_file_of_values_alone_is_one_patient(tmp_path):
+    path = tmp_path / "anna.yaml"
+    path.write_text("strength: 0.7\nsex: female\n")
+    found = population(str(path))
+    assert found.title == "anna"
+    assert found.sample(1) == found.sample(2) == Patient(strength=0.7, sex="female")
+
+
+def test_a_field_more_or_a_spread_more_moves_no_other_field():
+    """What a stream of its own for each field is for."""
+    plain = {**population("stroke_mild").fields}
+    wider = {**plain, "tremor_width": {"uniform": [0.0, 5.0]}, "strength": {"uniform": [0.5, 0.6]}}
+    for key in range(20):
+        one, other = Population(fields=plain).sample(key), Population(fields=wider).sample(key)
+        changed = {name for name in Patient.model_fields if getattr(one, name) != getattr(other, name)}
+        assert changed == {"tremor_width", "strength"}
+
+
+def test_what_a_patient_is_does_not_depend_on_the_mixture_it_is_drawn_from():
+    mixed = population({"mixture": {"stroke_mild": 1.0, "healthy": 0.0}})
+    for key in range(10):
+        assert mixed.sample(key) == population("stroke_mild").sample(key)

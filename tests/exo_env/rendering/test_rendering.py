@@ -15,7 +15,7 @@ pytest.importorskip("pygame")
 def env(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     settings = {"render_mode": "rgb_array", "patient": "stroke_mild", "action_mode": "pid_setpoint"}
-    made = gymnasium.make("exo/ElbowLift-v0", **settings)
+    made = gymnasium.make("exo/ElbowLift-v1", **settings)
     yield made
     made.close()
 
@@ -43,4 +43,6 @@ def test_a_scene_holds_who_does_how_much(env):
     scene, r = world.scene(), world.readings()
     assert (scene.muscle_moment, scene.device_moment) == (r["muscle_moment"], r["exo_moment"])
     assert scene.effort == r["effort"] and scene.error_deg == pytest.approx(np.degrees(r["tracking_error"]))
-    assert [tension for _, tension in scene.ropes] == [r["agonist_tension"], r["antagonist_tension"]]
+    assert [tension for _, tension in scene.ropes] == [
+        max(r[f"{rope}_tension"], 0.0) for rope in ("agonist", "antagonist")
+    ]

@@ -9,12 +9,11 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from dms_core.errors import InputError, SimulationError
-from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.world import batch as batch_module
 from exo_env.world.batch import Batch
 
-ENV = "exo_env:exo/ElbowLift-v0"
+ENV = "exo_env:exo/ElbowLift-v1"
 SHORT = {"episode_duration": 0.5, "observation": ["device", "emg", "privileged"]}
 
 
@@ -146,11 +145,11 @@ def test_sb3_sees_terminal_observations_and_time_limits():
     pytest.importorskip("stable_baselines3")
     from exo_env.envs.stable_baselines import ElbowLiftVecEnv
 
-    worlds = ElbowLiftVecEnv(4, threads=1, episode_duration=0.3, limits={"lowest_deg": 15.0})
+    worlds = ElbowLiftVecEnv(4, threads=1, episode_duration=0.3, limits={"lowest_deg": 20.0})
     worlds.seed(0)
     first = worlds.reset()
     assert first.shape == (4, 12) and first.dtype == np.float32
-    twin = [ElbowLiftEnv(episode_duration=0.3, limits={"lowest_deg": 15.0}) for _ in range(4)]
+    twin = [ElbowLiftEnv(episode_duration=0.3, limits={"lowest_deg": 20.0}) for _ in range(4)]
     for k, env in enumerate(twin):
         np.testing.assert_array_equal(env.reset(seed=k)[0], first[k])
     actions, ends = np.random.default_rng(2), []
@@ -171,7 +170,7 @@ def test_sb3_sees_terminal_observations_and_time_limits():
 
 
 def test_a_step_that_breaks_off_leaves_nothing_to_step(monkeypatch):
-    """A world that ends in the very step in which the opening of another fails must not go on past its last row."""
+    """A world that ends in the very step in which the begin of another fails must not go on past its last row."""
     batch = ElbowLiftVectorEnv(2, episode_duration=0.1, threads=2)
     batch.reset(seed=0)
     batch.step(np.zeros((2, 2)))
@@ -179,7 +178,7 @@ def test_a_step_that_breaks_off_leaves_nothing_to_step(monkeypatch):
     batch.reset(seed=1, options={"reset_mask": np.array([False, True])})
     for _ in range(4):
         batch.step(np.zeros((2, 2)))
-    monkeypatch.setattr(batch.envs[0], "opened", lambda code: (_ for _ in ()).throw(SimulationError("broken")))
+    monkeypatch.setattr(batch.envs[0], "begun", lambda code: (_ for _ in ()).throw(SimulationError("broken")))
     with pytest.raises(SimulationError, match="broken"):
         batch.step(np.zeros((2, 2)))
     with pytest.raises(gymnasium.error.ResetNeeded):
@@ -194,7 +193,7 @@ def test_a_step_that_breaks_off_leaves_nothing_to_step(monkeypatch):
 
 def test_an_interrupt_waits_for_the_threads(monkeypatch):
     """The caller is interrupted twice, in its own work and while it waits; no thread writes behind its back."""
-    batch, done = Batch(4, 12, threads=2), []
+    batch, done = Batch(4, 12, 5, np.zeros(0, np.int64), threads=2), []
 
     def slow(counter):
         if threading.current_thread() is threading.main_thread():

@@ -1,4 +1,4 @@
-"""The compiled opening of an episode against the declarations it stands for, and what it says where it fails."""
+"""The compiled begin of an episode against the declarations it stands for, and what it says where it fails."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 from dms_core.errors import InputError, SimulationError
-from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.jit import compiled
 from exo_env.patient.distributions import Draws, distribution
 from exo_env.patient.motor_command import SETTLED, InternalModel, plan_course
-from exo_env.patient.patient import FIELDS, Patient, fields_of
+from exo_env.patient.patient import PATIENT, Patient, fields_of
 from exo_env.patient.population import Population, population
-from exo_env.tasks.movement import Repetition, Repetitions, put_pieces
-from exo_env.world.reset import FOUND, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED
+from exo_env.streams import stream, uniform
+from exo_env.tasks.repetition import Repetition, Repetitions, put_pieces
+from exo_env.world.reset import GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED
+from exo_env.world.rest_pose import MOVING
+from exo_env.world.tables import OUTCOME
 from exo_env.world.work_sharing import areas_of, claim
 from exo_env.world.world import PLANNING
 
@@ -32,7 +34,8 @@ def test_pieces_are_those_of_the_declared_signal(seed):
     rng = np.random.default_rng(seed)
     count = 1 + seed % 4
     rest = {"rest": 0.0} if seed % 5 == 0 else {}
-    movement = Repetitions().sample(rng).model_copy(update={"count": count, "every": float(seed % 3) * 3.0, **rest})
+    drawn = Repetition.of_row([*Repetitions().draw(np.uint64(rng.integers(2**63)), 6.0)])
+    movement = drawn.model_copy(update={"count": count, "every": float(seed % 3) * 3.0, **rest})
     t, c = np.full(4 * count + 1, np.nan), np.full((4 * count + 1, 6), np.nan)
     put_pieces(movement.row(), t, c)
     wanted = movement.signal.pieces()
@@ -51,22 +54,22 @@ SPECS = (
 
 
 def test_draws_are_the_quantiles_of_each_distribution():
-    spreads = [distribution(spec) for spec in SPECS]
-    draws, found, wanted = Draws(spreads), np.random.default_rng(3), np.random.default_rng(3)
-    for _ in range(200):
-        x = draws.sample(found)
-        y = [d.quantile(wanted.random()) for d in spreads]
-        np.testing.assert_allclose(x, y, rtol=1e-14)
+    spreads = {f"number.{k}": distribution(spec) for k, spec in enumerate(SPECS)}
+    draws = Draws(spreads)
+    for key in map(np.uint64, range(200)):
+        wanted = [d.quantile(uniform(key, stream(name), 0)) for name, d in spreads.items()]
+        # Quantiles of the normal distribution are those of scipy to 15 digits, added to a mean of order 1.
+        np.testing.assert_allclose(draws.sample(key), wanted, rtol=1e-14, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["stroke_mild", "evaluation"])
 def test_drawn_patients_are_the_quantiles_of_each_field(name):
-    found = population(name)
-    row, generator = found.draw(np.random.default_rng(2)), np.random.default_rng(2)
-    wanted = {field: d.quantile(generator.random()) for field, d in found.distributions.items()}
+    found, key = population(name), np.uint64(2)
+    names = {field: field.replace("body_mass_index", "body_mass") for field in found.distributions}
+    wanted = {f: d.quantile(uniform(key, stream(f"patient.{names[f]}"), 0)) for f, d in found.distributions.items()}
     if "body_mass_index" in wanted:
         wanted["body_mass"] = wanted.pop("body_mass_index") * wanted["height"] ** 2
-    for field, x in fields_of(row).items():
+    for field, x in fields_of(found.draw(key)).items():
         assert x == (wanted[field] if isinstance(x, str) else pytest.approx(wanted[field], rel=1e-14)), field
 
 
@@ -80,7 +83,7 @@ def test_choices_are_checked_by_their_extremes_in_any_order():
 
 def test_rows_give_patients_and_movements_back():
     patient = population("evaluation").sample(np.random.default_rng(1)).changed(sex="female")
-    assert Patient.of_row(patient.row()) == patient and len(patient.row()) == len(FIELDS)
+    assert Patient.of_row(patient.row()) == patient and len(patient.row()) == len(PATIENT)
     movement = Repetition(start_deg=30.0, amplitude_deg=50.0, rest=0.1, count=3, every=7.0)
     assert Repetition.of_row(movement.row()) == movement
 
@@ -88,13 +91,14 @@ def test_rows_give_patients_and_movements_back():
 def test_the_command_is_that_of_the_internal_model(env):
     """Planned on a table of its own, over the whole episode and to more digits."""
     episode = env.episode
-    patient, machine = episode.patient, env.rig.machine
+    patient, machine = episode.patient, env.world.machine
     known = InternalModel.of(episode.arm, machine, patient.expected_load * episode.load)
     times = np.arange(round(env.duration / PLANNING) + 1) * PLANNING
-    planned = plan_course(known, times, episode.repetition.course(times)).activations
-    wanted = np.array([np.interp(env.rig.times, times, column) for column in planned.T]).T
+    repetition = Repetition.of_row(episode.movement)
+    planned = plan_course(known, times, repetition.course(times)).activations
+    wanted = np.array([np.interp(env.world.times, times, column) for column in planned.T]).T
     # Both iterations end within SETTLED of the same solution.
-    np.testing.assert_allclose(env.rig.plant.wanted, wanted, atol=2.0 * SETTLED)
+    np.testing.assert_allclose(env.world.tables.patient.wanted, wanted, atol=2.0 * SETTLED)
 
 
 @pytest.mark.parametrize(
@@ -104,17 +108,17 @@ def test_the_command_is_that_of_the_internal_model(env):
         (GAPING, SimulationError, "joints stay open by 0.25"),
     ],
 )
-def test_an_opening_that_fails_says_why(env, code, error, sentence):
-    found = env.rig.setting.values.found
-    found[FOUND.left], found[FOUND.gap] = 0.5, 0.25
+def test_a_begin_that_fails_says_why(env, code, error, sentence):
+    outcome = env.world.tables.outcome
+    outcome[OUTCOME.left], outcome[OUTCOME.gap] = 0.5, 0.25
     with pytest.raises(error, match=sentence):
-        env.rig.opened(code)
+        env.world.begun(code)
 
 
 def test_without_accelerations_there_is_no_episode(env, monkeypatch):
-    monkeypatch.setattr(type(env.rig.world), "reorder", lambda self: False)
+    monkeypatch.setattr(type(env.world.dynamics), "reorder", lambda self: False)
     with pytest.raises(SimulationError, match=r"\(at the start of an episode\)"):
-        env.rig.opened(NO_RATES)
+        env.world.begun(NO_RATES)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -156,51 +160,52 @@ def test_an_unknown_option_draws_nothing(env):
 def test_a_pulley_within_reach_is_refused():
     env = ElbowLiftEnv()
     env.reset(seed=0)
-    rig = env.rig
-    setting = rig.setting.values
-    near = tuple(float(x) for x in setting.elbow + (0.0, -0.2, 0.0))
-    rig.machine, setting.low_pulley[:] = rig.machine.changed(low_pulley=near), near
+    world = env.world
+    near = tuple(float(x) for x in world.tables.scaling.elbow + (0.0, -0.2, 0.0))
+    world.machine, world.tables.subject.low_pulley[:] = world.machine.changed(low_pulley=near), near
     env.prepare(0)
-    code = rig.open()
+    code = world.begin()
     assert code == PULLEY_IN_REACH
     with pytest.raises(InputError, match="low_pulley = .* from the elbow, and the handle reaches"):
-        env.opened(code)
+        env.begun(code)
 
 
 def test_a_start_that_does_not_close_is_seen(env):
     """Forearm and device in each other's place."""
     env.prepare(7)
-    places = env.rig.setting.values.places
-    places[0], places[1] = places[1], places[0]
+    places, pair = env.world.tables.rest.places, [MOVING.forearm, MOVING.lower_link]
+    places[pair] = places[pair[::-1]]
     try:
-        code = env.rig.open()
+        code = env.world.begin()
     finally:
-        places[0], places[1] = places[1], places[0]
+        places[pair] = places[pair[::-1]]
     assert code in (GAPING, NO_RATES)
     with pytest.raises(SimulationError, match="start of an episode"):
-        env.opened(code)
+        env.begun(code)
     env.reset(seed=5)
 
 
-def test_a_number_that_is_none_stops_an_opening(env):
+def test_a_number_that_is_none_stops_a_begin(env):
     env.prepare(8)
-    env.rig.setting.values.patient[FIELDS.index("expected_load")] = np.nan
-    code = env.rig.open()
+    env.world.tables.draw.patient[PATIENT.expected_load] = np.nan
+    code = env.world.begin()
     assert code == UNSETTLED
     with pytest.raises(SimulationError, match="does not settle"):
-        env.opened(code)
+        env.begun(code)
     env.reset(seed=5)
 
 
 @pytest.mark.parametrize("table", ["muscles", "points"])
 def test_a_command_of_numbers_that_are_none_does_not_settle(env, table):
-    known = InternalModel.of(env.episode.arm, env.rig.machine, 1.0)
+    known = InternalModel.of(env.episode.arm, env.world.machine, 1.0)
     numbers = getattr(known.arm, table).copy()
     numbers[1, 0] = np.nan
     times = np.arange(20) * PLANNING
     with pytest.raises(SimulationError, match="does not settle"):
         plan_course(
-            InternalModel(known.arm._replace(**{table: numbers}), known.load), times, Repetition().course(times)
+            InternalModel(known.arm._replace(**{table: numbers}), known.load, known.muscles),
+            times,
+            Repetition().course(times),
         )
 
 
@@ -222,11 +227,11 @@ def test_no_two_threads_claim_the_same():
 
 def test_areas_hold_every_array_but_those_left_out(env):
     areas = areas_of(env.packed, ("noise",))
-    plant = env.rig.plant
+    tables = env.world.tables
 
     def within(x):
         first = x.ctypes.data
         return ((areas[:, 0] <= first) & (first + x.nbytes <= areas.sum(axis=1))).any()
 
-    assert within(plant.effort) and within(env.rig.world.state.newton_values) and within(plant.wanted)
-    assert not within(plant.noise)
+    assert within(tables.patient.effort.command) and within(env.world.dynamics.state.newton_values)
+    assert within(tables.task.readings) and not within(tables.observer.noise)

@@ -1,21 +1,23 @@
-"""Numbers and start of a rig against those of a model declared, placed and assembled for the same patient."""
+"""Numbers and start of a world against those of a model declared, placed and assembled for the same patient."""
 
 import numpy as np
 import pytest
 
 from dms_core import Model
-from exo_env.drives.drive import DRIVES
-from exo_env.ecosystem.arm import MUSCLES, Arm
+from dms_core.errors import ModelError
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.gym_machine import ROPE
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.patient.patient import Patient
 from exo_env.patient.population import population
-from exo_env.world.scaling import Numbers, declared, fitting, numbers_of, template
+from exo_env.tasks.repetition import Repetition
+from exo_env.world.scaling import Numbers, declared, monomials, numbers_of, scaling_of, template
 
+DRIVES = ElbowLiftEnv.drives
 MODES = tuple(DRIVES)
 PATIENTS = (
-    *(population("evaluation").sample(np.random.default_rng(k)) for k in range(6)),
+    *(population("evaluation").sample(k) for k in range(6)),
     Patient(body_mass=20.0, height=1.0, sex="female", strength=0.1, activation_time_scale=5.0),
     Patient(body_mass=250.0, height=1.7, strength=5.0, activation_time_scale=4.5, deactivation_time_scale=0.5),
 )
@@ -25,7 +27,7 @@ def declared_model(patient: Patient, weight: float, mode: str, **start) -> Model
     """As an episode would have to be made without fitting."""
     joined, drive = Ecosystem(person=patient.person, weight=weight), DRIVES[mode]()
     times = patient.time_constants(Arm(patient.person))
-    return Model(declared(joined, drive, times=times, **start), like=template(mode))
+    return Model(declared(joined, drive, times=times, **start), like=template(joined, drive))
 
 
 def rope_number(model: Model) -> int:
@@ -38,7 +40,9 @@ def rope_number(model: Model) -> int:
 @pytest.mark.parametrize("patient", PATIENTS)
 def test_numbers_are_those_of_the_declared_patient(mode, patient):
     weight = 0.5 + patient.height
-    found = fitting(Ecosystem(), mode, DRIVES[mode]()).numbers(patient, weight)
+    scaling = scaling_of(Ecosystem(), DRIVES[mode]())
+    C = scaling.coefficients(patient.sex)
+    found = scaling.split(C @ monomials(patient.person, weight, patient.time_constants(Arm())))
     model = declared_model(patient, weight, mode, start=1.0, held=np.zeros(2))
     wanted = numbers_of(model, Arm(patient.person))
     rope = rope_number(model)
@@ -58,10 +62,10 @@ def test_start_is_that_of_the_declared_patient(mode, angle_deg):
     env.reset(seed=int(angle_deg), options={"initial_angle_deg": angle_deg})
     episode = env.episode
     patient, state = episode.patient, episode.world.state
-    activations = state.q[[episode.model.layout.index[f"{m}.activation"] for m in MUSCLES]]
+    activations = state.q[[episode.model.layout.index[f"{m}.activation"] for m in episode.arm.muscles]]
     model = declared_model(
-        patient, episode.load, mode, start=np.radians(angle_deg), held=env.packed.values.commands,
-        reference=episode.repetition.signal, activations=activations,
+        patient, episode.load, mode, start=np.radians(angle_deg), held=episode.tables.drive.commands,
+        reference=Repetition.of_row(episode.movement).signal, activations=activations,
     )  # fmt: skip
     rope = rope_number(model)
     assert episode.model.numbers[1][rope] == pytest.approx(model.numbers[1][rope], abs=1e-11)
@@ -72,8 +76,8 @@ def test_start_is_that_of_the_declared_patient(mode, angle_deg):
     np.testing.assert_allclose(state.v[slow], model.start.v[slow], atol=1e-11)
 
 
-def test_a_rig_forgets_the_patient_before():
-    """A seed gives the same bits, whoever sat in the rig before and however the episode ended."""
+def test_a_world_forgets_the_patient_before():
+    """A seed gives the same bits, whoever was in the device before and however the episode ended."""
     used, fresh = ElbowLiftEnv(patient="evaluation"), ElbowLiftEnv(patient="evaluation")
     for seed in (3, 4):
         used.reset(seed=seed, options={"reference": {"rest": 0.0}})
@@ -90,3 +94,33 @@ def test_a_rig_forgets_the_patient_before():
         assert one[1:4] == other[1:4]
     for name, value in used.readings().items():
         assert value == fresh.readings()[name], name
+
+
+def test_a_template_of_the_same_elements_is_shared_and_another_one_is_made():
+    drive, default = DRIVES["rope_tension"](), Ecosystem()
+    heavy = default.changed(device={"lower_link": {"mass": 0.9}})
+    assert template(heavy, drive) is template(default, drive)
+    one_rope = {"ropes": {"lift": default.device.ropes["agonist"]}}
+    single = default.changed(device=default.device.model_copy(update=one_rope))
+    assert template(single, DRIVES["rope_tension"](max_tension=(200.0,))) is not template(default, drive)
+
+
+class WithSpring(Ecosystem):
+    """An element whose number is not linear in the sizes of a person."""
+
+    def more_parts(self, arm, worn):
+        from dms_core.model import JointSpringDamper
+
+        class Spring:
+            bodies = staticmethod(lambda flexion: [])
+            joints = staticmethod(lambda: [])
+            forces = staticmethod(
+                lambda: [JointSpringDamper(name="band", joint="elbow", stiffness=arm.person.height**5)]
+            )
+
+        return [Spring()]
+
+
+def test_a_number_that_is_not_linear_in_the_sizes_is_named():
+    with pytest.raises(ModelError, match="element 'band': a number of it, .* is not linear in the person's sizes"):
+        scaling_of(WithSpring(), DRIVES["rope_tension"]()).coefficients("male")

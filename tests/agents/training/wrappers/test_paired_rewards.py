@@ -6,8 +6,7 @@ import pytest
 from agents.training.config import Config
 from agents.training.worlds import training_worlds
 from dms_core.errors import InputError
-from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
+from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from tests.agents.tiny import content
 
 pytest.importorskip("stable_baselines3")

@@ -1,0 +1,54 @@
+"""The device's own PID holds psi + offset: a_0 shifts its setpoint, a_1 sets its share of authority.
+
+The shift passes a second-order filter inside the system of equations, since psi must be C1 for the controller; the rate
+of the authority is limited.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from dms_core.model import ReferenceFilter
+from dms_core.model.element import Force
+from exo_env.drives.drive import Command, Drive, affine
+from exo_env.ecosystem.ecosystem import ASSISTANCE, REFERENCE
+from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
+
+SETPOINT, FILTER = "setpoint", "setpoint_filter"
+
+
+class PidSetpoint(Drive):
+    """Drive of action mode 'pid_setpoint'."""
+
+    kernel: ClassVar[Any] = affine
+    rtol: ClassVar[float] = 0.2
+    """As for rope tensions, 0.9e-3 and 1.2e-3 rad; what is left over is in the motors' tensions, and the controller
+    keeps it from the elbow."""
+    setpoint_range: float = Field(default=0.2, gt=0.0, le=1.0, description="largest setpoint change [rad]; assumed")
+    filter_frequency: float = Field(default=20.0, gt=0.0, le=200.0, description="of the setpoint filter [rad/s]")
+    filter_damping: float = Field(default=1.0, gt=0.0, le=5.0, description="damping ratio of the filter [-]")
+    authority_rate: float = Field(default=10.0, gt=0.0, description="largest change of the authority [1/s]; assumed")
+
+    def actions(self, device: Exoskeleton) -> tuple[str, ...]:
+        """Setpoint and authority."""
+        return "setpoint change", "authority"
+
+    def commands(self, device: Exoskeleton) -> tuple[Command, ...]:
+        """No change, and half of the authority, as for an action of zeros."""
+        return Command(SETPOINT, math.inf), Command(ASSISTANCE, self.authority_rate, start=0.5)
+
+    def numbers(self, device: Exoskeleton) -> np.ndarray:
+        """Offset and gain to setpoint change [rad] and authority [-], shape (2, 2)."""
+        return np.array([[0.0, self.setpoint_range], [0.5, 0.5]])
+
+    def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
+        """The filter and the device, whose controller reads it."""
+        smooth = ReferenceFilter(
+            name=FILTER, input=SETPOINT, frequency=self.filter_frequency, damping=self.filter_damping
+        )
+        return [smooth, *worn.forces(REFERENCE, ASSISTANCE, f"{FILTER}.setpoint")]

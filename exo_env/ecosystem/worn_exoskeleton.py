@@ -1,0 +1,146 @@
+"""A device on an arm: upper link fixed to the humerus, hinge, guide to the forearm, controller, motors and ropes."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from dms_core.model import (
+    Fixed,
+    JointSpringDamper,
+    LineGuide,
+    PathPoint,
+    Pid,
+    PlaneGuide,
+    Revolute,
+    RigidBody,
+    RopeActuator,
+    RopeForce,
+    Slider,
+)
+from dms_core.model.element import Constraint, Force, Vector
+from dms_core.model.geometry.frames import quaternion, quaternion_product, rotation_matrix
+from exo_env.ecosystem.arm import Arm
+from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.settings import Settings
+
+UPPER, LOWER, HINGE, GUIDE, PID = "upper_link", "lower_link", "exo_hinge", "guide", "pid"
+GuideKind = Literal["plane", "line", "slider"]
+
+
+class Misalignment(Settings):
+    """How the device is worn: hinge against elbow, in the axes of the links."""
+
+    shift: Vector = Field(default=(0.0, 0.0, 0.0), description="of the hinge from the elbow centre [m]")
+    tilt_deg: tuple[float, float] = Field(default=(0.0, 0.0), description="of the hinge axis about x, then y [deg]")
+
+
+def motor_name(rope: str) -> str:
+    """Name of the motor that pulls a rope."""
+    return f"{rope}_motor"
+
+
+def link_axes(arm: Arm) -> np.ndarray:
+    """Axes x, y, z of an aligned link where the elbow is straight, as columns in ground axes, shape (3, 3)."""
+    z = arm.axis
+    y = np.array([0.0, 1.0, 0.0]) - z[1] * z
+    y /= np.linalg.norm(y)
+    return np.column_stack([np.cross(y, z), y, z])
+
+
+def _orientation(axes: np.ndarray) -> np.ndarray:
+    """Euler parameters of a rotation matrix near the identity."""
+    p0 = 0.5 * np.sqrt(1.0 + np.trace(axes))
+    e = np.array([axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]]) / (4.0 * p0)
+    return np.concatenate([[p0], e])
+
+
+class WornExoskeleton:
+    """A device on an arm: its bodies, constraints and forces.
+
+    Args:
+        device: the exoskeleton.
+        arm: whose humerus carries it.
+        misalignment: how it sits.
+        guide: 'plane' (one row), 'line' (two) or 'slider' (five).
+    """
+
+    def __init__(self, device: Exoskeleton, arm: Arm, misalignment: Misalignment, guide: GuideKind = "plane") -> None:
+        self.device, self.arm, self.guide_kind = device, arm, guide
+        axes = link_axes(arm)
+        about_x, about_y = (math.radians(x) for x in misalignment.tilt_deg)
+        tilt = quaternion_product(quaternion((1, 0, 0), about_x), quaternion((0, 1, 0), about_y))
+        self.aligned = misalignment == Misalignment()
+        """Whether the hinge axis is that of the elbow."""
+        self.axes = axes
+        self.shift = axes @ np.array(misalignment.shift)
+        """From the elbow centre to the hinge, in ground axes [m]."""
+        self.orientation = quaternion_product(_orientation(axes), tilt)
+        self.origin = arm.elbow + self.shift
+
+    @property
+    def frame(self) -> np.ndarray:
+        """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
+        return self.axes if self.aligned else rotation_matrix(self.orientation)
+
+    @property
+    def guided_point(self) -> np.ndarray:
+        """Point of the forearm's long axis that the guide leads, in the forearm's frame [m]."""
+        return self.axes @ (0.0, -self.device.guide_distance, 0.0)
+
+    def bodies(self, flexion: float) -> list[RigidBody]:
+        """Both links with the hinge at `flexion` [rad], at rest."""
+        turned = quaternion_product(self.orientation, quaternion((0, 0, 1), flexion))
+        return [
+            RigidBody(name=name, **dict(link), position=tuple(self.origin), orientation=tuple(p))
+            for name, link, p in (
+                (UPPER, self.device.upper_link, self.orientation),
+                (LOWER, self.device.lower_link, turned),
+            )
+        ]
+
+    def joints(self) -> list[Constraint]:
+        """Upper link fixed to the humerus, hinge, guide."""
+        on_humerus = tuple(self.origin - self.arm.segments["humerus"].origin)
+        return [
+            Fixed(name="cuff", body_i="humerus", body_j=UPPER, point_i=on_humerus),
+            Revolute(name=HINGE, body_i=UPPER, body_j=LOWER, point_j=(0.0, 0.0, 0.0), axis_j=(0.0, 0.0, 1.0)),
+            self._guide(),
+        ]
+
+    def _guide(self) -> Constraint:
+        """Lower link and a point of the forearm on its long axis, seen across the elbow axis."""
+        at = (0.0, -self.device.guide_distance, 0.0)
+        if self.guide_kind == "plane":
+            across, point = (1.0, 0.0, 0.0), tuple(self.guided_point)
+            return PlaneGuide(name=GUIDE, body_i=LOWER, body_j="forearm", normal_i=across, point_i=at, point_j=point)
+        kind = LineGuide if self.guide_kind == "line" else Slider
+        return kind(name=GUIDE, body_i=LOWER, body_j="forearm", axis_i=(0.0, 1.0, 0.0), point_i=at)
+
+    def forces(
+        self, reference: str, authority: str, offset: str | None = None, *, start_tension: float | None = None
+    ) -> list[Force]:
+        """Hinge friction, controller, motors and ropes.
+
+        Args:
+            reference: name of the input psi(t) [rad].
+            authority: name of the input that scales the controller's command, 0 to 1 [-].
+            offset: coordinate added to the reference [rad], such as a filtered setpoint.
+            start_tension: of the lifting rope [N]; None: that of a command without error.
+        """
+        d = self.device
+        forces: list[Force] = [
+            JointSpringDamper(name="hinge_friction", joint=HINGE, damping=d.hinge_damping),
+            Pid(name=PID, joint=HINGE, reference=reference, offset=offset, drift_gain=d.drift_gain, **dict(d.gains)),
+        ]
+        for name, rope in d.ropes.items():
+            motor = RopeActuator(
+                name=motor_name(name), pid=PID, sign=rope.sign, authority=authority,
+                start_tension=start_tension if name == d.lifting_rope else None, **dict(d.actuator),
+            )  # fmt: skip
+            path = (PathPoint(body=UPPER, point=rope.upper), PathPoint(body=LOWER, point=rope.lower))
+            forces += [motor, RopeForce(name=name, path=path, coordinate=f"{motor.name}.tension")]
+        return forces

@@ -1,0 +1,397 @@
+"""What all environments share: one assisted arm as a Gymnasium environment.
+
+An environment is a task (tasks/task.py), drives to choose from by `action_mode` (drives/drive.py), an ecosystem and
+settings. One with a page and an id of its own is a subclass in a file of its own:
+
+    class HoldStillEnv(AssistanceEnv):
+        task_type = HoldStill
+        drives = {"rope_tension": RopeTension}
+
+    class HoldStillVectorEnv(AssistanceVectorEnv):         envs/vector_env.py
+        env_type = HoldStillEnv
+
+    register(id="mine/HoldStill-v0", entry_point=HoldStillEnv, vector_entry_point=HoldStillVectorEnv,
+             disable_env_checker=True)
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import warnings
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from dms_core import SolverOptions
+from dms_core.errors import InputError, choices
+from dms_core.kernels import DONE, MATRIX_SINGULAR, Packed
+from dms_core.results import Result
+from dms_core.simulation.dynamics import RESULT_OF
+from exo_env.drives.drive import Drive, checked_action
+from exo_env.drives.pid_setpoint import PidSetpoint
+from exo_env.drives.rope_tension import RopeTension
+from exo_env.ecosystem.ecosystem import Ecosystem
+from exo_env.envs.settings import (
+    MOST_CYCLE,
+    SOLVER_OPTIONS,
+    EnvSettings,
+    check_number,
+    check_whole,
+    control_steps,
+    load_distribution,
+    within,
+    worn_device,
+    worn_misalignment,
+)
+from exo_env.patient.distributions import Draws
+from exo_env.patient.population import population
+from exo_env.rendering.scene import Scene
+from exo_env.streams import stream, uniform
+from exo_env.tasks.channels import Parts, Slice
+from exo_env.tasks.movement import START, Movement
+from exo_env.tasks.observer import Observer
+from exo_env.tasks.task import NOTHING, Task
+from exo_env.world.control_period import finish, run_period
+from exo_env.world.episode import Draw, Episode
+from exo_env.world.readout import Readout
+from exo_env.world.tables import STATUS
+from exo_env.world.world import PatientWorld
+
+OPTIONS = ("patient", "load", "reference", "initial_angle_deg")
+LOAD, PHASE = "load", stream("tremor.phase")
+"""Random streams of the load and of the tremor's phase."""
+TRANSIENT = ("_episode", "_readout", "_renderer", "world")
+"""What a copy of an environment does without: it belongs to one process and one episode."""
+
+
+class AssistanceEnv(gymnasium.Env):
+    """One arm with a worn device, as an environment. See the page of a subclass, such as `ElbowLiftEnv`.
+
+    Args:
+        settings: by keyword, see `EnvSettings` or the environment's page.
+
+    Raises:
+        InputError: a setting is unknown or not usable.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+    task_type: ClassVar[type[Task]]
+    drives: ClassVar[Mapping[str, type[Drive]]] = {"rope_tension": RopeTension, "pid_setpoint": PidSetpoint}
+    settings_type: ClassVar[type[EnvSettings]] = EnvSettings
+    ecosystem_type: ClassVar[type[Ecosystem]] = Ecosystem
+    duration: float = 6.0
+    """Of an episode [s], unless the settings say otherwise."""
+
+    def __init__(self, **settings: Any) -> None:
+        # What a caller does to a mapping afterwards must not reach into the environment.
+        self.settings = s = self._checked(copy.deepcopy(settings))
+        if s.render_mode is not None:
+            from exo_env.rendering.canvas import import_pygame
+
+            import_pygame()
+        check_number("control_rate", s.control_rate, 5.0, 1000.0, "Hz")
+        if s.episode_duration is not None:
+            check_number("episode_duration", s.episode_duration, 0.1, 120.0, "s")
+        if s.rtol is not None:
+            check_number("rtol", s.rtol, 1e-8, 0.2)
+        if s.cycle is not None:
+            check_whole("cycle", s.cycle, MOST_CYCLE)
+        self.render_mode, self.period = s.render_mode, 1.0 / s.control_rate
+        self.metadata = {**type(self).metadata, "render_fps": round(s.control_rate)}
+        self.duration = float(s.episode_duration or self.usual_duration(s))
+        self.steps = control_steps(self.duration, s.control_rate)
+        self.ecosystem = self.made_ecosystem(s)
+        self.action_mode, self.drive = s.action_mode, self._made_drive(s)
+        actions = self.drive.actions(self.ecosystem.device)
+        self.task = self.task_type(
+            Parts(self.ecosystem.arm().muscles, tuple(self.ecosystem.device.ropes), actions), s.reward_weights, s.limits
+        )
+        self.movement, self.population = self.made_movement(s.reference), population(s.patient)
+        self.load = load_distribution(s.load)
+        self.observer = Observer(s.observation, self.task.readings, self.task.groups, s.noise, self.period)
+        self.solver = SolverOptions(rtol=self.drive.rtol if s.rtol is None else s.rtol, **SOLVER_OPTIONS)
+        self.actions = len(actions)
+        self.action_space = spaces.Box(-1.0, 1.0, (self.actions,), np.float32)
+        self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
+        self._weights = self.task.weights.model_dump()
+        self._loads = Draws({LOAD: self.load})
+        self._options: dict[str, Any] = {}
+        self._keys: list[int] = []
+        self._episode: Episode | None = None
+        self._readout: Readout | None = None
+        self._over, self._resets = False, 0
+        self._renderer: Any = None
+
+    @classmethod
+    def _checked(cls, settings: Mapping[str, Any]) -> EnvSettings:
+        known = cls.settings_type.model_fields
+        for name in settings:
+            if name not in known:
+                raise InputError(f"setting '{name}' is unknown; there are {choices(known)}.")
+        return cls.settings_type(**settings)
+
+    def usual_duration(self, settings: EnvSettings) -> float:
+        """Of an episode where the settings name none [s]."""
+        return type(self).duration
+
+    def made_ecosystem(self, settings: EnvSettings) -> Ecosystem:
+        """Arm, device and machine."""
+        return self.ecosystem_type(
+            device=worn_device(settings.exoskeleton), subject=settings.subject,
+            misalignment=worn_misalignment(settings.misalignment),
+        )  # fmt: skip
+
+    def made_movement(self, reference: Any) -> Movement:
+        """What patients intend, from the distributions that a user gives."""
+        return self._that_fits(self.task_type.movement_type.of(reference), reference)
+
+    def _that_fits(self, movement: Movement, given: Any) -> Movement:
+        """The movement, with a warning where somebody gave one that the episode may cut off."""
+        if given is not None and movement.longest() > self.duration + 1e-9:
+            warnings.warn(
+                f"the movement may take {movement.longest():.4g} s, and an episode ends after {self.duration:.4g} s: "
+                "what is left is cut off; give a longer episode_duration, or a shorter reference.",
+                stacklevel=4,
+            )
+        return movement
+
+    def _made_drive(self, settings: EnvSettings) -> Drive:
+        """The drive of the action mode, with some of its settings."""
+        if settings.action_mode not in self.drives:
+            raise InputError(f"action_mode = {settings.action_mode!r}: expected one of {choices(self.drives)}.")
+        given = settings.drive_settings
+        if not (given is None or isinstance(given, Mapping)):
+            raise InputError(f"drive_settings = {given!r}: expected a mapping, or None.")
+        return self.drives[settings.action_mode](**(given or {}))
+
+    @property
+    def observation_structure(self) -> tuple[Slice, ...]:
+        """Group, name, place, unit, scale and range of each part of the observation, in order."""
+        return self.observer.structure
+
+    @property
+    def weights(self) -> Any:
+        """Of the reward terms."""
+        return self.task.weights
+
+    @property
+    def limits(self) -> Any:
+        """What ends an episode."""
+        return self.task.limits
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """A new patient at the start of a movement.
+
+        Args:
+            seed: of the environment's one generator.
+            options: may fix 'patient' (whatever the constructor takes), 'load' [kg], 'reference' (numbers of the
+                movement) and 'initial_angle_deg' [deg]; nothing else changes by that.
+
+        Raises:
+            InputError: an option is unknown or not usable.
+        """
+        self.prepare(seed, options)
+        self.begun(self.world.begin())
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), self.start_info()
+
+    def _observation(self) -> np.ndarray:
+        return self.world.tables.observer.observation.astype(np.float32)
+
+    def prepare(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
+        """First part of a reset: draw an episode. The second is compiled code, the third is `begun`."""
+        super().reset(seed=seed)
+        self._over, self._episode = True, None
+        if seed is not None:
+            self._keys, self._resets = [], 0
+        used = {**self._options, **self._known_options(options)}
+        self.world.prepare(self._drawn(self._key(), used))
+
+    def set_reset_options(self, options: Mapping[str, Any] | None) -> None:
+        """Options of every reset from now on, for curricula; those that a reset is given come on top.
+
+        Raises:
+            InputError: an option is unknown.
+        """
+        self._options = dict(self._known_options(options))
+
+    def _known_options(self, options: Mapping[str, Any] | None) -> Mapping[str, Any]:
+        if not isinstance(options, Mapping | None):
+            raise InputError(f"options = {options!r}: expected a mapping with some of {choices(OPTIONS)}, or None.")
+        for name in options or {}:
+            if name not in OPTIONS:
+                raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
+        return options or {}
+
+    def begun(self, code: int) -> None:
+        """Last part of a reset, with what came of the compiled one."""
+        self._episode = self.world.begun(code)
+        self._readout = Readout(self.world, self._episode)
+        self._over = False
+
+    def _key(self) -> int:
+        """Key of the next episode's random streams: the one number that a reset takes from the generator."""
+        cycle, self._resets = self.settings.cycle, self._resets + 1
+        if cycle is not None and self._resets > cycle:
+            return self._keys[(self._resets - 1) % cycle]
+        key = int(self.np_random.integers(2**63))
+        if cycle is not None:
+            self._keys.append(key)
+        return key
+
+    def _drawn(self, key: int, options: Mapping[str, Any]) -> Draw:
+        """The episode of a key; what options fix is drawn from the same streams, and moves nothing else."""
+        k = np.uint64(key)
+        patients, loads, movement = self.population, self._loads, self.movement
+        if options:
+            if "patient" in options:
+                patients = population(options["patient"])
+            if "load" in options:
+                loads = Draws({LOAD: load_distribution(options["load"])})
+            if "reference" in options:
+                movement = self.made_movement(options["reference"])
+        numbers = movement.draw(k, self.duration)
+        start_deg = options.get("initial_angle_deg", numbers[movement.names.index(START)])
+        low, high = self.task.start_range()
+        if not within(start_deg, low, high):
+            raise InputError(f"initial_angle_deg = {start_deg!r}: expected a number from {low:g} to {high:g}.")
+        phase = 2.0 * math.pi * uniform(k, PHASE, 0)
+        return Draw(key, patients.draw(k), float(loads.sample(k)[0]), numbers, math.radians(start_deg), phase)
+
+    @cached_property
+    def world(self) -> PatientWorld:
+        """The world in which all episodes take place."""
+        return PatientWorld(
+            self.ecosystem, self.drive, self.task, self.movement, self.observer, period=self.period,
+            duration=self.duration, steps=self.steps, options=self.solver,
+        )  # fmt: skip
+
+    @property
+    def packed(self) -> Packed:
+        """The packed WorldTables, for a batch."""
+        return self.world.packed
+
+    @property
+    def episode(self) -> Episode:
+        """The present episode.
+
+        Raises:
+            gymnasium.error.ResetNeeded: `reset` was not called.
+        """
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded("The environment has no episode; call reset() first.")
+        return self._episode
+
+    @property
+    def readout(self) -> Readout:
+        """True readings of the present episode."""
+        _ = self.episode
+        assert self._readout is not None
+        return self._readout
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """One control period, over which the commands go linearly to those of an action.
+
+        Args:
+            action: numbers that are clipped to -1 to 1.
+
+        Raises:
+            InputError: the action has another shape or is not finite.
+            gymnasium.error.ResetNeeded: there is no episode, or it is over.
+        """
+        used, _ = checked_action(action, self.actions), self.episode
+        if self._over:
+            raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
+        # Until the period is done to its end: what breaks it off leaves nothing to step.
+        self._over = True
+        if run_period(self.world.packed.table, used) != DONE:
+            self.rescue()
+        status = self.world.tables.status
+        terminated, truncated = bool(status[STATUS.event] != NOTHING), bool(status[STATUS.step] == self.steps)
+        self._over = terminated or truncated
+        if self.render_mode == "human":
+            self.render()
+        info = self.readout.info(self._weights, self.happened())
+        return self._observation(), float(self.world.tables.task.reward[0]), terminated, truncated, info
+
+    def rescue(self) -> None:
+        """Go on where compiled code gave up: a singular matrix may need another order of elimination."""
+        dynamics, status = self.world.dynamics, self.world.tables.status
+        dynamics.result = RESULT_OF[int(status[STATUS.code])]
+        if status[STATUS.code] == MATRIX_SINGULAR:
+            dynamics.advance(float(self.world.times[status[STATUS.step] + 1]))
+        if dynamics.result is Result.INTERRUPTED:
+            raise KeyboardInterrupt
+        if dynamics.result is Result.SUCCESS:
+            status[STATUS.code] = DONE
+            self.world.follow_dynamics()
+        finish(self.world.packed.table)
+
+    def happened(self) -> str | None:
+        """The sentence on what ended the episode, or None."""
+        return self.readout.happened()
+
+    def readings(self) -> dict[str, float]:
+        """Everything at the present time, without noise: every sensor of the model and what follows from them.
+
+        Beside them 'time' [s], the readings of the task, the commands reached, counts and worst errors of the solver.
+        Units: `reading_units()`.
+        """
+        return self.readout.readings()
+
+    def reading_units(self) -> dict[str, str]:
+        """Unit of each sensor and reading in `readings`."""
+        units = {reading.name: reading.unit for reading in self.task.readings if not reading.sensors}
+        return dict(self.episode.model.layout.outputs) | units
+
+    def start_info(self) -> dict[str, Any]:
+        """What the episode is made of."""
+        return self.readout.start_info(self.movement)
+
+    def summary(self) -> str:
+        """A table of what is active: reward terms with their weights, observed channels, actions, and what ends."""
+        return self.task.summary(self.observation_structure)
+
+    def scene(self) -> Scene:
+        """What a picture shows of the present time."""
+        from exo_env.rendering.episode_scene import scene_of
+
+        return scene_of(self.readout, self._label())
+
+    def _label(self) -> str:
+        """Names the patient in a picture."""
+        p = self.episode.patient
+        return f"flexors {p.maximum_activation_flexors:.0%}, extensors {p.maximum_activation_extensors:.0%}"
+
+    def render(self) -> np.ndarray | None:
+        """The arm from the side: an array of shape (480, 480, 3) in mode 'rgb_array', a window in mode 'human'."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() was called without a render_mode; give one to gymnasium.make.")
+            return None
+        if self._renderer is None:
+            from exo_env.rendering.renderer import Renderer
+
+            mode: Any = self.render_mode
+            self._renderer = Renderer(mode, fps=self.metadata["render_fps"])
+        return self._renderer.draw(self.scene())
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the episode and its compiled world: a copy is the same environment, and must be reset."""
+        return {name: value for name, value in self.__dict__.items() if name not in TRANSIENT}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _episode=None, _readout=None, _renderer=None, _over=False)

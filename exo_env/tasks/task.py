@@ -1,0 +1,173 @@
+"""The contract of a task: what is observed, rewarded and ended, and along which movement.
+
+A task is a class in one file. It declares its reward terms (the fields of `weights_type`), what ends an episode
+(`limits_type`, `events`), the movement that the patient intends, its readings and the groups of channels that show
+them, and two compiled kernels, functions of a packed world w (world/tables.py), which the batch calls by address:
+
+    read(w)      fills the derived readings of the present control time, behind those that sensors give
+    judge(w)     fills the value of each term, and sets the event that ends the episode, if there is one
+
+When they are called, readings that name sensors are copied already, and so are traits of the patient; where the solver
+failed, `read` is not called, and `judge` finds the event SOLVER. Readings are found by name:
+
+    R = places(["angle", "rate"])                      built once, from the names in the order of `readings`
+    r, at = readings(w), first_of(w)                   the array, and where each reading begins in it
+    r[at[R.angle]]                                     first component of a reading
+
+The reward is the sum of the terms times their weights. An environment is a task, an ecosystem, drives and settings
+(envs/base_env.py); the same task serves single environments and batches.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dms_core.kernels import floats, inner, ints
+from exo_env.jit import compiled
+from exo_env.settings import Settings
+from exo_env.tasks.channels import Channel, Parts, Reading, Slice
+from exo_env.tasks.movement import Movement
+from exo_env.world.tables import STATUS, TASK, WORLD
+
+NOTHING, SOLVER, FIRST_EVENT = range(3)
+"""Codes of what ended an episode: nothing, a solver that failed, and the first event of the task's own."""
+Values = Callable[[str], np.ndarray]
+"""Gives the components of a reading by its name."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """A number that `info` of a step tells."""
+
+    name: str
+    reading: str
+    factor: float = 1.0
+    """From the reading's unit to that of the number."""
+
+
+class Task(ABC):
+    """Base of all tasks.
+
+    Args:
+        parts: names of what the ecosystem and the drive have.
+        weights: changes of the terms' weights.
+        limits: changes of the limits.
+    """
+
+    weights_type: ClassVar[type[Settings]]
+    """Settings with a weight for each reward term, in the order in which `judge` fills them."""
+    limits_type: ClassVar[type[Settings]]
+    """Settings with a method `numbers()`: what the kernels read of them."""
+    movement_type: ClassVar[type[Movement]]
+    events: ClassVar[tuple[str, ...]]
+    """Names of what ends an episode; their codes begin with FIRST_EVENT."""
+    preview: ClassVar[tuple[float, ...]] = ()
+    """How far ahead the patient's plan is tabulated for the kernels [s]."""
+    told: ClassVar[tuple[Told, ...]] = ()
+    read: ClassVar[Any]
+    judge: ClassVar[Any]
+
+    def __init__(
+        self, parts: Parts, weights: Mapping[str, float] | None = None, limits: Mapping[str, float] | None = None
+    ) -> None:
+        self.parts = parts
+        self.weights, self.limits = self.weights_type(**(weights or {})), self.limits_type(**(limits or {}))
+        self.readings = self.declared_readings(parts)
+        self.groups = self.declared_groups(parts)
+
+    @abstractmethod
+    def declared_readings(self, parts: Parts) -> list[Reading]:
+        """Everything that the kernels read and that channels show, in the order of the array."""
+
+    @abstractmethod
+    def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
+        """Channels of each group."""
+
+    @abstractmethod
+    def sentence(self, event: str, values: Values) -> str:
+        """What is said of an event, with the readings of its time."""
+
+    def start_range(self) -> tuple[float, float]:
+        """Elbow angles at which an episode may begin [deg]."""
+        return 0.0, 142.0
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the reward terms."""
+        return tuple(type(self.weights).model_fields)
+
+    def numbers(self) -> np.ndarray:
+        """What the kernels read beside the readings: here those of the limits."""
+        return self.limits.numbers()  # type: ignore[attr-defined]
+
+    def weight_numbers(self) -> np.ndarray:
+        """Weight of each term."""
+        return np.array([getattr(self.weights, name) for name in self.terms], dtype=float)
+
+    def summary(self, structure: Sequence[Slice]) -> str:
+        """A table of what is active: reward terms, observed channels, actions, and what ends an episode.
+
+        Args:
+            structure: of the observation.
+        """
+        lines = [f"{type(self).__name__}", "", f"{'reward term':28}{'weight':>10}"]
+        lines += [f"{name:28}{getattr(self.weights, name):10.4g}" for name in self.terms]
+        lines += ["", f"{'observed channel':28}{'place':>10}{'unit':>8}{'scale':>8}"]
+        for part in structure:
+            place = str(part.start) if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
+            lines.append(f"{part.group + '.' + part.name:28}{place:>10}{part.unit:>8}{part.scale:8.4g}")
+        lines += ["", "actions: " + ", ".join(self.parts.actions), "ends with: " + ", ".join((*self.events, "solver"))]
+        return "\n".join(lines)
+
+    def event(self, code: int, values: Values) -> str:
+        """What is said of an event by its code."""
+        return self.sentence(self.events[code - FIRST_EVENT], values)
+
+
+@compiled
+def readings(w):
+    """All readings of a world."""
+    return floats(inner(w, WORLD.task), TASK.readings)
+
+
+@compiled
+def first_of(w):
+    """Place of the first component of each reading, in the order of the task's readings."""
+    return ints(inner(w, WORLD.task), TASK.first)
+
+
+@compiled
+def terms_of(w):
+    """Value of each reward term, in the order of the weights."""
+    return floats(inner(w, WORLD.task), TASK.terms)
+
+
+@compiled
+def task_numbers(w):
+    """What `Task.numbers` gave."""
+    return floats(inner(w, WORLD.task), TASK.numbers)
+
+
+@compiled
+def step_of(w):
+    """Control periods done."""
+    return ints(w, WORLD.status)[STATUS.step]
+
+
+@compiled
+def event_of(w):
+    """Code of the event so far."""
+    return ints(w, WORLD.status)[STATUS.event]
+
+
+@compiled
+def end_with(w, code):
+    """End the episode with an event, unless another one has."""
+    status = ints(w, WORLD.status)
+    if status[STATUS.event] == NOTHING:
+        status[STATUS.event] = code

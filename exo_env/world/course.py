@@ -1,0 +1,29 @@
+"""Values of psi along an episode: polynomials in pieces, evaluated at times."""
+
+from __future__ import annotations
+
+from exo_env.jit import compiled
+
+
+@compiled
+def course_of(starts, c, times, out):
+    """Value, rate and acceleration of a signal's pieces, which go on behind the last and before the first.
+
+    Args:
+        starts: of the pieces [s], shape (n,).
+        c: their coefficients, shape (n, 6).
+        times: in rising order [s], shape (k,).
+        out: shape (k, 3).
+    """
+    i = 0
+    for k in range(times.shape[0]):
+        while i + 1 < starts.shape[0] and starts[i + 1] <= times[k]:
+            i += 1
+        x = times[k] - starts[i]
+        out[k, 0] = out[k, 1] = out[k, 2] = 0.0
+        for j in range(c.shape[1] - 1, -1, -1):
+            # Horner's scheme of a polynomial, its rate and half its acceleration.
+            out[k, 2] = out[k, 2] * x + out[k, 1]
+            out[k, 1] = out[k, 1] * x + out[k, 0]
+            out[k, 0] = out[k, 0] * x + c[i, j]
+        out[k, 2] *= 2.0
