@@ -34,7 +34,7 @@ MOVED = {
     "repetition": "tasks.movement",
     "rewards": "tasks.rewards",
     "rig": "world.world",
-    "sb3": "envs.stable_baselines",
+    "sb3": "envs.elbow_lift_sb3",
     "scenarios": "paper.scenarios",
     "scene": "rendering.scene",
     "shapes": "rendering.shapes",

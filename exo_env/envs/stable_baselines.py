@@ -1,16 +1,15 @@
-"""Many environments in a compiled batch as a VecEnv of Stable-Baselines3; the only module that needs that library."""
+"""Many environments in a compiled batch as a VecEnv of Stable-Baselines3, which this module needs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
 from dms_core.errors import InputError
-from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
 from exo_env.envs.vector_env import AssistanceVectorEnv
 
 
@@ -108,18 +107,3 @@ class AssistanceVecEnv(VecEnv):
 
 MADE = ("drive", "task", "ecosystem", "population", "movement", "observer", "period", "duration", "solver")
 """Attributes of an environment that follow from its settings."""
-
-
-class ElbowLiftVecEnv(AssistanceVecEnv):
-    """Many ElbowLiftEnv for Stable-Baselines3.
-
-    Args:
-        num_envs: number of worlds.
-        threads: that step them; None takes one for each core.
-        settings: of ElbowLiftEnv.
-    """
-
-    vector_type: ClassVar[type[AssistanceVectorEnv]] = ElbowLiftVectorEnv
-
-    def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:
-        super().__init__(ElbowLiftVectorEnv, num_envs, threads=threads, **settings)

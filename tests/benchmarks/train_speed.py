@@ -26,7 +26,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, Ve
 from agents.training.algorithms import build
 from agents.training.config import Config
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.envs.stable_baselines import ElbowLiftVecEnv
+from exo_env.envs.elbow_lift_sb3 import ElbowLiftVecEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import LUMP_MS, lump
 

@@ -143,7 +143,7 @@ def test_a_world_fits_into_256_kib():
 
 def test_sb3_sees_terminal_observations_and_time_limits():
     pytest.importorskip("stable_baselines3")
-    from exo_env.envs.stable_baselines import ElbowLiftVecEnv
+    from exo_env.envs.elbow_lift_sb3 import ElbowLiftVecEnv
 
     worlds = ElbowLiftVecEnv(4, threads=1, episode_duration=0.3, limits={"lowest_deg": 20.0})
     worlds.seed(0)

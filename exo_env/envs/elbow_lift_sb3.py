@@ -1,0 +1,21 @@
+"""exo/ElbowLift-v1 as a VecEnv of Stable-Baselines3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
+from exo_env.envs.stable_baselines import AssistanceVecEnv
+
+
+class ElbowLiftVecEnv(AssistanceVecEnv):
+    """Many ElbowLiftEnv for Stable-Baselines3.
+
+    Args:
+        num_envs: number of worlds.
+        threads: that step them; None takes one for each core.
+        settings: of ElbowLiftEnv.
+    """
+
+    def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:
+        super().__init__(ElbowLiftVectorEnv, num_envs, threads=threads, **settings)
