@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from gymnasium.vector import AutoresetMode
+
 from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
 from exo_env.envs.stable_baselines import AssistanceVecEnv
 
@@ -18,4 +20,5 @@ class ElbowLiftVecEnv(AssistanceVecEnv):
     """
 
     def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:
-        super().__init__(ElbowLiftVectorEnv, num_envs, threads=threads, **settings)
+        same_step = AutoresetMode.SAME_STEP
+        super().__init__(ElbowLiftVectorEnv(num_envs, autoreset_mode=same_step, threads=threads, **settings))

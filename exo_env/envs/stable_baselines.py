@@ -21,19 +21,17 @@ class AssistanceVecEnv(VecEnv):
     tells, and solver_failed are in it too.
 
     Args:
-        vector_type: class of the batch, such as ElbowLiftVectorEnv.
-        num_envs: number of worlds.
-        threads: that step them; None takes one for each core.
-        settings: of the environment.
+        worlds: a batch, made with `autoreset_mode="SameStep"`.
+
+    Raises:
+        InputError: the batch resets its worlds otherwise.
     """
 
-    def __init__(
-        self, vector_type: type[AssistanceVectorEnv], num_envs: int, *, threads: int | None = None, **settings: Any
-    ) -> None:
-        self.worlds = vector_type(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **settings)
-        self.render_mode = self.worlds.render_mode
-        self.metadata = self.worlds.metadata
-        super().__init__(num_envs, self.worlds.single_observation_space, self.worlds.single_action_space)
+    def __init__(self, worlds: AssistanceVectorEnv) -> None:
+        if worlds.autoreset_mode is not AutoresetMode.SAME_STEP:
+            raise InputError(f"autoreset_mode = '{worlds.autoreset_mode.value}': expected 'SameStep'.")
+        self.worlds, self.render_mode, self.metadata = worlds, worlds.render_mode, worlds.metadata
+        super().__init__(worlds.num_envs, worlds.single_observation_space, worlds.single_action_space)
         self._actions: np.ndarray | None = None
 
     def reset(self) -> np.ndarray:

@@ -1,0 +1,65 @@
+"""Every script in examples/ runs, and its answer is right where it can be told."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from dms_core.config_files import configs
+
+ROOT = configs().parent
+EXAMPLES = ROOT / "examples"
+
+
+def answer(name: str) -> str:
+    """What a script prints."""
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(EXAMPLES / f"{name}.py")]
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def numbers(text: str, pattern: str) -> list[float]:
+    return [float(x) for x in re.findall(pattern, text)]
+
+
+def falling(values: list[float]) -> bool:
+    return all(a > b for a, b in zip(values[:-1], values[1:], strict=True))
+
+
+CHECKS = {
+    "own_patient": lambda said: max(numbers(said, r"'(0\.\d+)'")) < 1.0,
+    "own_device": lambda said: falling(numbers(said, r"rms error (\S+) deg")[::-1]),
+    "own_reward": lambda said: "'quiet': -" in said and "'reaction': 2.0" in said,
+    "own_task": lambda said: "HoldAtSixty" in said and "device.tension" in said and "rewards" in said,
+    # Water slows the fall of a limp arm.
+    "own_element": lambda said: falling([abs(x) for x in numbers(said, r"(\S+) deg/s")]),
+    "own_policy": lambda said: len(numbers(said, r"return (\S+)")) == 2,
+    "curriculum": lambda said: falling([sum(numbers(line, r"\d\.\d\d?")[1:]) for line in said.splitlines()][::-1]),
+    "batch": lambda said: "seed 7: True" in said,
+    "readings": lambda said: "drawn: " in said,
+    # The multiplier of the driver at rest is the moment of gravity.
+    "inverse_dynamics": lambda said: len(set(numbers(said, r"(?:1\.4 s: +|gives )(\S+) Nm"))) == 1,
+    "pid_tuning": lambda said: falling(numbers(said, r"rms error (\S+) deg")),
+    "sb3_training": lambda said: len(numbers(said, r"20 episodes: (\S+)")) == 1,
+}
+
+
+def test_every_script_is_listed_and_run():
+    scripts = {path.stem for path in EXAMPLES.glob("*.py")}
+    assert scripts == set(CHECKS)
+    listed = (EXAMPLES / "README.md").read_text()
+    assert all(f"({name}.py)" in listed for name in scripts)
+
+
+@pytest.mark.parametrize("name", list(CHECKS))
+def test_the_answer_is_right(name):
+    if name == "sb3_training":
+        pytest.importorskip("stable_baselines3")
+    said = answer(name)
+    assert CHECKS[name](said), said
