@@ -31,10 +31,10 @@ def read_call(text: str) -> dict[str, Any]:
         found = _value(ast.parse(text.strip(), mode="eval").body)
     except (SyntaxError, ValueError) as error:
         raise InputError(
-            f"{text!r} is not a mapping: {error}; dict(key=value, ...) with plain values is wanted."
+            f"{text!r} is not a mapping ({error}): expected dict(key=value, ...) with plain values."
         ) from None
     if not isinstance(found, dict):
-        raise InputError(f"{text!r} is a {type(found).__name__}; dict(key=value, ...) with plain values is wanted.")
+        raise InputError(f"{text!r} is a {type(found).__name__}: expected dict(key=value, ...) with plain values.")
     return found
 
 

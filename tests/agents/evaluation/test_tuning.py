@@ -5,6 +5,7 @@ import inspect
 
 import numpy as np
 import pytest
+from agents.policies.yielding import YieldingPid
 
 from agents.__main__ import main
 from agents.evaluation.evaluate import patient_seeds
@@ -12,7 +13,6 @@ from agents.evaluation.tuning import POPULATION, STREAM, trial, tunable, tune
 from agents.policies.assist_as_needed import AssistAsNeeded
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.tuned import Range, numbers
-from agents.policies.yielding import YieldingPid
 from dms_core.config_files import configs
 from dms_core.errors import InputError
 from dms_core.yaml_text import read_yaml

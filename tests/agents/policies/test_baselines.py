@@ -3,12 +3,12 @@
 import gymnasium
 import numpy as np
 import pytest
+from agents.policies.yielding import YieldingPid
 
 from agents.evaluation.evaluate import evaluate
 from agents.policies.assist_as_needed import AssistAsNeeded, gaussians
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.compensation import ANGLES, CompensatedPid, holding_tensions
-from agents.policies.yielding import YieldingPid
 from dms_core.errors import InputError
 from exo_env.ecosystem.arm import Person
 from exo_env.ecosystem.ecosystem import Ecosystem

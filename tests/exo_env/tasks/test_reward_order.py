@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from agents.policies.yielding import YieldingPid
 
 from agents.evaluation.evaluate import evaluate
 from agents.policies.baselines import NoAssistance, PidControl
 from agents.policies.policy import Policy
-from agents.policies.yielding import YieldingPid
 
 REPETITION = {"start_deg": 30.0, "amplitude_deg": 60.0, "rest": 0.5, "duration": 2.0, "pause": 0.5}
 SLACK = {"slacking_rate": 0.3, "effort_recovery": 4.0, "least_effort": 0.2, "co_contraction": 0.2, "feedback_gain": 0.2}

@@ -11,24 +11,25 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
-from agents.policies.learned import Description, LearnedPolicy, world_facts
-from agents.policies.network import Architecture
-from agents.provenance import package_version
-from agents.training.algorithms import ACTIVATIONS
-from agents.training.config import ENVIRONMENT_ID
-from agents.training.wrappers.low_pass import kept_shares
 from dms_core.errors import InputError
+
+from ..policies.learned import Description, LearnedPolicy, world_facts
+from ..policies.network import Architecture
+from ..provenance import package_version
+from .algorithms import ACTIVATIONS
+from .wrappers.low_pass import kept_shares
 
 
 def extract(
-    model: BaseAlgorithm, env: gymnasium.Env, *, algorithm: str, env_kwargs: dict[str, Any], seed: int | None,
-    normalisation: VecNormalize | None = None, traces: Sequence[float] = (), hold: int = 1,
+    model: BaseAlgorithm, env: gymnasium.Env, *, environment: str, algorithm: str, env_kwargs: dict[str, Any],
+    seed: int | None, normalisation: VecNormalize | None = None, traces: Sequence[float] = (), hold: int = 1,
 ) -> LearnedPolicy:  # fmt: skip
     """The policy of a model.
 
     Args:
         model: PPO, SAC, TQC or RecurrentPPO on vectors.
         env: one environment of its kind, unstacked.
+        environment: id of its environment.
         algorithm: its name.
         env_kwargs: of its training environment.
         seed: of its training.
@@ -50,7 +51,7 @@ def extract(
     shape = _architecture(model, arrays, output, env, statistics, kept_shares(traces, hold * world.period), hold)
     description = Description(
         title=f"{algorithm.upper().replace('_', ' ')}" + ("" if seed is None else f", seed {seed}"),
-        algorithm=algorithm, environment=ENVIRONMENT_ID, exo_env=package_version(), env_kwargs=env_kwargs,
+        algorithm=algorithm, environment=environment, exo_env=package_version(), env_kwargs=env_kwargs,
         architecture=shape, steps=model.num_timesteps, seed=seed, **world_facts(env),
     )  # fmt: skip
     return LearnedPolicy(description, arrays)
