@@ -94,7 +94,7 @@ def _begun(
         folder = RunFolder(resume)
         return folder, *folder.go_on(changes)
     if config is None:
-        raise InputError("--config FILE or --resume DIR is needed; see configs/agents.")
+        raise InputError("--config FILE or --resume DIR is needed; configs/agents holds some.")
     if seed < 0:
         raise InputError(f"seed = {seed}: expected a whole number from 0.")
     # A mistake shall not leave a folder behind.

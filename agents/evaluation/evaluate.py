@@ -59,10 +59,10 @@ class Plan:
 
     def __post_init__(self) -> None:
         check_numbers(self.patients, self.seed)
-        found = population(self.population)
+        source = population(self.population)
         object.__setattr__(self, "id", environment_id(self.environment))
-        object.__setattr__(self, "title", found.title)
-        object.__setattr__(self, "patient", found.model_dump())
+        object.__setattr__(self, "title", source.title)
+        object.__setattr__(self, "patient", source.model_dump())
 
     @property
     def cases(self) -> list[Case]:

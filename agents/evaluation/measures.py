@@ -168,8 +168,8 @@ def smoothness(repetition: Repetition, times: np.ndarray, rate: np.ndarray, peri
     backs = lifts + repetition.duration + repetition.pause
     edges = [*np.stack([lifts, backs], axis=1).flat, math.inf]
     parts = [rate[(times >= a) & (times < b)] for a, b in pairwise(edges)]
-    found = [sparc(np.abs(part), 1.0 / period) for part in parts]
-    return float(np.mean([x for x in found if math.isfinite(x)])) if np.isfinite(found).any() else math.nan
+    values = [sparc(np.abs(part), 1.0 / period) for part in parts]
+    return float(np.mean([x for x in values if math.isfinite(x)])) if np.isfinite(values).any() else math.nan
 
 
 def sparc(speed: np.ndarray, frequency: float) -> float:

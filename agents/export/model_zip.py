@@ -36,19 +36,12 @@ def from_zip(
         )
     require_training()
     from ..training.algorithms import find
-    from ..training.extraction import extract
+    from ..training.extraction import Origin, extract
 
     model, env = _read(find(algorithm), source), make(environment)
     try:
-        return extract(
-            model,
-            env,
-            environment=environment_id(environment),
-            algorithm=algorithm,
-            env_kwargs={},
-            seed=model.seed,
-            normalisation=_statistics(statistics),
-        )
+        origin = Origin(environment_id(environment), algorithm, model.seed)
+        return extract(model, env, origin, _statistics(statistics))
     except AttributeError as error:
         raise InputError(f"'{source}' is not a model of {algorithm}: {error}.") from None
     finally:

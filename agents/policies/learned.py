@@ -209,17 +209,17 @@ def own_policy(name: str) -> Policy:
     """
     module, _, kind = name.partition(":")
     try:
-        found = getattr(importlib.import_module(module), kind)
+        own = getattr(importlib.import_module(module), kind)
     except (ImportError, ValueError, AttributeError) as error:
         raise InputError(f"policy '{name}': expected module:Class that Python can import, got: {error}.") from None
-    if not (isinstance(found, type) and issubclass(found, Policy)):
-        raise InputError(f"policy '{name}': expected a subclass of {Policy.__module__}.Policy, got {found!r}.")
-    missing = [what for what in ("title", "action_mode") if not hasattr(found, what)]
-    if missing or found.__abstractmethods__:
+    if not (isinstance(own, type) and issubclass(own, Policy)):
+        raise InputError(f"policy '{name}': expected a subclass of {Policy.__module__}.Policy, got {own!r}.")
+    missing = [what for what in ("title", "action_mode") if not hasattr(own, what)]
+    if missing or own.__abstractmethods__:
         raise InputError(
-            f"policy '{name}': the class lacks {choices([*missing, *found.__abstractmethods__])}; see Policy."
+            f"policy '{name}': the class lacks {choices([*missing, *own.__abstractmethods__])}; see Policy."
         )
-    one = found()
+    one = own()
     one.__dict__["name"] = name
     return one
 

@@ -82,10 +82,10 @@ def arguments(config: Config) -> dict[str, Any]:
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
     if squashed and start is None and "log_std_init" in given:
         raise InputError(f"{name}: policy_kwargs: log_std_init does nothing without training.start.")
-    found = {k: _scheduled(v) for k, v in config.arguments.items()}
+    made = {k: _scheduled(v) for k, v in config.arguments.items()}
     if given:
-        found["policy_kwargs"] = {k: activation(v) if k == "activation_fn" else v for k, v in given.items()}
-    return found
+        made["policy_kwargs"] = {k: activation(v) if k == "activation_fn" else v for k, v in given.items()}
+    return made
 
 
 def policies(name: str) -> list[str]:
@@ -124,15 +124,15 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
         seen = seen_places(worlds, critic, len(config.training.traces))
         policy, given["policy_kwargs"] = TwoViewPolicy, given.get("policy_kwargs", {}) | {"seen": seen}
     try:
-        found = find(config.training.algorithm)(
+        made = find(config.training.algorithm)(
             policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
         )
     except (AssertionError, ValueError, TypeError, RuntimeError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
     if config.training.start is not None:
-        _begin_at(found.policy, torch.tensor(config.training.start))
-    return found
+        _begin_at(made.policy, torch.tensor(config.training.start))
+    return made
 
 
 def _begin_at(policy: Any, action: torch.Tensor) -> None:

@@ -20,7 +20,7 @@ from dms_core.errors import DmsError
 from ..policies.learned import LearnedPolicy
 from .algorithms import build
 from .config import Config
-from .extraction import extract
+from .extraction import Origin, extract
 from .learning_curve import STATE, Judge, LearningCurve, checkpoint_name
 from .model_state import load_state, save_state
 from .run_folder import RunFolder
@@ -142,11 +142,12 @@ class TrainingRun:
 
     def policy(self) -> LearnedPolicy:
         """The policy of now."""
-        return extract(
-            self.model, self.curve.env, environment=self.config.environment,
-            algorithm=self.config.training.algorithm, env_kwargs=self.config.env_kwargs, seed=self.seed,
-            traces=self.config.training.traces, hold=self.config.training.hold,
+        training = self.config.training
+        origin = Origin(
+            self.config.environment, training.algorithm, self.seed, self.config.env_kwargs, training.traces,
+            training.hold,
         )  # fmt: skip
+        return extract(self.model, self.curve.env, origin)
 
     def _restore(self, state: dict[str, Any]) -> None:
         """Counters of a checkpoint."""

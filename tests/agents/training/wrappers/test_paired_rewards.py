@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+from agents.environment import ENVIRONMENT, make, make_vector
 from agents.training.config import Config
 from agents.training.worlds import training_worlds
 from dms_core.errors import InputError
-from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
 from tests.agents.tiny import content
 
 pytest.importorskip("stable_baselines3")
@@ -32,7 +31,7 @@ def test_the_twins_action_earns_nothing_in_any_episode():
 def test_a_reward_is_that_of_the_world_less_that_of_its_twin():
     action, against = (-0.3, 0.9), (0.1, 0.6)
     worlds = training_worlds(PIDS, WORLDS, 7, against=against)
-    alone = ElbowLiftVectorEnv(2 * WORLDS, autoreset_mode="SameStep", **PIDS)
+    alone = make_vector(ENVIRONMENT, 2 * WORLDS, autoreset_mode="SameStep", **PIDS)
     first = worlds.reset()
     begun, _ = alone.reset(seed=[7, 8, 9, 7, 8, 9])
     np.testing.assert_array_equal(first, begun[:WORLDS])
@@ -60,7 +59,7 @@ def test_a_pair_that_fell_out_of_step_begins_together_again(dropped):
     }  # fmt: skip
     falls, held = (-1.0, -1.0), (-0.6, -1.0)
     action, against = (falls, held) if dropped == "world" else (held, falls)
-    worlds, single = training_worlds(settings, 1, 3, against=against), ElbowLiftEnv(**settings)
+    worlds, single = training_worlds(settings, 1, 3, against=against), make(ENVIRONMENT, **settings)
     worlds.reset()
     single.reset(seed=3)
     times, alone = [], 0.0
