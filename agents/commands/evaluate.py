@@ -38,7 +38,7 @@ def evaluate(
     """Run policies on the same patients: a table, evaluation.json, evaluation.md and evaluation.png.
 
     Args:
-        policy_names: one or more, see `python -m agents policies`, folders of trained ones, or module:Class.
+        policy_names: one or more: names of the command `policies`, folders of trained ones, or module:Class.
         out: folder for the results; made where it is missing.
         population: of the patients, by name or YAML file.
         patients: how many; one episode each, or one a load.

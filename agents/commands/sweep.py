@@ -30,7 +30,7 @@ def sweep(
     """Train every configuration with every seed; the same command again goes on where it was stopped.
 
     Args:
-        configs: YAML files, see configs/agents.
+        configs: YAML files in the format of rl_zoo3, as in configs/agents.
         out: folder of the trainings, one in each CONFIG_SEED; with a cluster, one that all its machines see.
         seeds: of the trainings.
         changes: values that replace those of all configurations.

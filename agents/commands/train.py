@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from tqdm import tqdm
 from tyro.conf import arg
 
+from dms_core.config_files import configs
 from dms_core.errors import InputError
 
 from ..environment import PROGRAM, environment_id
@@ -34,7 +35,7 @@ def train(
     """Train a policy; Ctrl-C saves a checkpoint, and --resume goes on from the last one.
 
     Args:
-        config: YAML file in the format of rl_zoo3, see configs/agents.
+        config: YAML file in the format of rl_zoo3, as in configs/agents.
         seed: decides all that is random.
         changes: values that replace those of the configuration, for example n_timesteps=1e5 policy_kwargs.net_arch=[32]
             training.eval_every=1e4.
@@ -94,7 +95,7 @@ def _begun(
         folder = RunFolder(resume)
         return folder, *folder.go_on(changes)
     if config is None:
-        raise InputError("--config FILE or --resume DIR is needed; configs/agents holds some.")
+        raise InputError(f"expected --config FILE or --resume DIR; there are files in {configs() / 'agents'}.")
     if seed < 0:
         raise InputError(f"seed = {seed}: expected a whole number from 0.")
     # A mistake shall not leave a folder behind.

@@ -40,7 +40,7 @@ def video(
     """Film policies side by side, with the same patient, load and repetition.
 
     Args:
-        policy_names: one to four, see `python -m agents policies`, or folders of trained ones.
+        policy_names: one to four: names of the command `policies`, folders of trained ones, or module:Class.
         out: .mp4, or .gif; without ffmpeg an .mp4 becomes a .gif.
         patient: population to draw from.
         seed: of the episode.

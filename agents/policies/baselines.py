@@ -30,11 +30,13 @@ class NoAssistance(Policy):
     name, title, action_mode = "none", "no assistance", "rope_tension"
 
     def reset(self, env: gymnasium.Env) -> None:
-        """Nothing to remember."""
+        """How many ropes there are."""
+        assert env.action_space.shape is not None
+        self._ropes = env.action_space.shape
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
         """Commands of no tension."""
-        return np.array([-1.0, -1.0])
+        return np.full(self._ropes, -1.0)
 
 
 class PidControl(Policy):
