@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, SimulationError, choices
+from exo_env.tasks.movement import Repetition
 from exo_env.world.episode import Episode
 
 from ..environment import ENVIRONMENT, make_vector, patient_seeds
@@ -115,7 +116,7 @@ def upper_bound(
     )  # fmt: skip
     tried, results = schedules(np.random.default_rng(seed)), []
     for one in patient_seeds(seed, patients):
-        results.append(tried_on(worlds, one, tried))
+        results.append(tried_on(worlds, one, tried, repetitions))
         progress()
     worlds.close()
     return results, tried
@@ -126,16 +127,25 @@ def best_together(results: list[Tried], n: int) -> int:
     return int(np.argmax(np.sum([one.returns[:n].sum(axis=0) for one in results], axis=0)))
 
 
-def tried_on(worlds: Any, seed: int, tried: np.ndarray) -> Tried:
-    """All schedules on one patient; `worlds` is the vector environment."""
+def tried_on(worlds: Any, seed: int, tried: np.ndarray, n: int = 1) -> Tried:
+    """All schedules on one patient.
+
+    Args:
+        worlds: the vector environment, a world a schedule.
+        seed: of the patient.
+        tried: the schedules, shape (TRIES, 4).
+        n: repetitions of the movement in an episode.
+    """
     _, drawn = worlds.reset(seed=[seed] * worlds.num_envs)
     envs = worlds.envs
     lacking = [name for name in NEEDS if name not in envs[0].readings()]
-    if lacking or "reference" not in drawn:
-        raise InputError(f"an upper bound needs a reference and the readings {choices(NEEDS)}; here are none of them.")
+    lacking += ["reference"] if "reference" not in drawn else []
+    if lacking:
+        raise InputError(f"an upper bound needs readings that this environment does not have: {choices(lacking)}.")
     episode, period = envs[0].episode, envs[0].period
-    movement, times = episode.repetition, episode.times[:-1]
-    n = movement.count
+    numbers: dict[str, Any] = {k: float(x[0]) for k, x in drawn["reference"].items() if not k.startswith("_")}
+    movement = Repetition(**numbers)
+    times = episode.times[:-1]
     shape, up, steps = (n, TRIES), movement.rest + movement.duration, len(times) // n
     sums = Tried(
         seed, float(drawn["ability"][0]), np.zeros(shape), np.zeros(shape), np.zeros((2, *shape)), np.zeros(shape),
