@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from tqdm import tqdm
 from tyro.conf import arg
 
-from dms_core.errors import InputError
+from dms_core.errors import DmsError, InputError
 from dms_core.output_file import check_writable, whole_file, write_json
 from exo_env.rendering.panels import require_matplotlib
 
@@ -35,7 +35,7 @@ def evaluate(
     workers: Literal["here", "ray"] = "here",
     address: str | None = None,
 ) -> int:
-    """Run policies on the same patients: a table, evaluation.json, evaluation.md and evaluation.png.
+    """Run policies on the same patients: a table, evaluation.json, evaluation.md and, with matplotlib, evaluation.png.
 
     Args:
         policy_names: one or more: names of the command `policies`, folders of trained ones, or module:Class.
@@ -57,7 +57,6 @@ def evaluate(
     used = [find_policy(name) for name in policy_names]
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     plan = Plan(population, patients, seed, loads, environment, settings)
-    require_matplotlib()
     check_writable(out / "evaluation.json")
     with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
 
@@ -72,12 +71,24 @@ def evaluate(
         else:
             results = results_of(used, [episodes_of(one, plan, plan.cases, progress) for one in used], plan)
     write_json(out / "evaluation.json", _json(results))
-    draw(out / "evaluation.png", results)
+    _draw(out / "evaluation.png", results)
     with whole_file(out / "evaluation.md") as file:
         file.write("\n".join(whole_table(results)))
     print("\n".join([heading(results), statistic(results), *left_out_lines(results), "", short_table(results), ""]))
     print(f"written: {out} (all measures: evaluation.md, all episodes: evaluation.json)")
     return 0
+
+
+def _draw(path: Path, results: dict[str, Any]) -> None:
+    """The figure, where matplotlib is installed; numbers and tables do without."""
+    try:
+        require_matplotlib()
+    except DmsError as error:
+        # One of an earlier run would be of other episodes.
+        path.unlink(missing_ok=True)
+        print(f"{path.name} is left out: {error}")
+    else:
+        draw(path, results)
 
 
 def policies() -> int:

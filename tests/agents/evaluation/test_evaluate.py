@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -153,6 +154,15 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 1
     assert (tmp_path / "evaluation.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.md", "evaluation.png"]
+
+
+def test_without_matplotlib_the_figure_is_left_out(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "evaluation.png").touch()
+    assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path / "out")]) == 0
+    assert "evaluation.png is left out: " in capsys.readouterr().out
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["evaluation.json", "evaluation.md"]
 
 
 def test_command_takes_repetitions(tmp_path, capsys):
