@@ -39,9 +39,9 @@ def test_a_reward_is_that_of_the_world_less_that_of_its_twin():
     for _ in range(STEPS):
         seen, rewards, over, _ = worlds.step(np.tile(action, (WORLDS, 1)))
         if over.any():
-            own, twins = worlds.get_attr("episode"), worlds.unwrapped.get_attr("episode", range(WORLDS, 2 * WORLDS))
-            for mine, theirs in zip(own, twins, strict=True):
-                assert (mine.patient, mine.load, mine.repetition) == (theirs.patient, theirs.load, theirs.repetition)
+            # Patient, load, movement and start.
+            twins = worlds.unwrapped.env_method("start_info", indices=range(WORLDS, 2 * WORLDS))
+            assert worlds.env_method("start_info") == twins
         there, parts, *_ = alone.step(given)
         np.testing.assert_array_equal(seen, there[:WORLDS])
         single = parts.astype(np.float32)
@@ -75,9 +75,7 @@ def test_a_pair_that_fell_out_of_step_begins_together_again(dropped):
             assert rewards[0] == np.float32(alone)
         times.append(count)
     assert max(times) < 50 if dropped == "world" else times == [100, 100]
-    (own,) = worlds.get_attr("episode")
-    twin = worlds.unwrapped.get_attr("episode", 1)[0]
-    assert own.patient == twin.patient and own.load == twin.load and own.repetition == twin.repetition
+    assert worlds.env_method("start_info") == worlds.unwrapped.env_method("start_info", indices=1)
     assert seen.shape == (1, worlds.observation_space.shape[0])
     worlds.close()
 
