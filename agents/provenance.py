@@ -24,22 +24,24 @@ def package_version() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of Python, of this package and of what it stands on."""
-    found = {"python": platform.python_version(), "exo_env": package_version()}
+    """Versions of Python, of this package and of what it stands on."""
+    versions = {"python": platform.python_version(), "exo_env": package_version()}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
+            versions[name] = version(name)
         except PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 def revision() -> str | None:
     """Git revision of the checkout, with '+' where files differ from it; None where there is none."""
     folder = Path(exo_env.__file__).resolve().parents[1]
+    if not (folder / "pyproject.toml").is_file():
+        return None  # Installed: a repository around it is somebody else's.
     try:
-        asked = [["git", "rev-parse", "HEAD"], ["git", "status", "--porcelain", "--untracked-files=no"]]
-        said = [subprocess.run(a, cwd=folder, capture_output=True, text=True, timeout=10, check=True) for a in asked]
+        commands = [["git", "rev-parse", "HEAD"], ["git", "status", "--porcelain", "--untracked-files=no"]]
+        done = [subprocess.run(a, cwd=folder, capture_output=True, text=True, timeout=10, check=True) for a in commands]
     except (OSError, subprocess.SubprocessError):
         return None
-    return said[0].stdout.strip() + ("+" if said[1].stdout.strip() else "")
+    return done[0].stdout.strip() + ("+" if done[1].stdout.strip() else "")

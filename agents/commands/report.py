@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from agents.evaluation import report_figures
-from agents.evaluation.evaluate import able_ones, differences, summary
-from agents.evaluation.report_figures import Group
-from agents.evaluation.tables import whole_table
-from agents.evaluation.time_course import Course, course
-from agents.policies.baselines import POLICIES
-from agents.policies.learned import find_policy, repetitions_of, shipped_policies
-from agents.policies.policy import Policy
-from agents.training.config import Config
-from agents.training.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, whole_file
 from exo_env.patient.population import population, shipped_populations
 from exo_env.rendering.panels import require_matplotlib
 
-EVALUATION = "evaluation.json"
+from ..environment import ENVIRONMENT, environment_id
+from ..evaluation import report_figures
+from ..evaluation.tables import whole_table
+from ..evaluation.time_course import TimeCourse, time_course
+from ..policies.baselines import POLICIES
+from ..policies.learned import find_policy, shipped_policies
+from ..policies.policy import Policy
+from ..training.run_folder import read_record
+from .options import device_settings, repeated
+from .report_input import collected, grouped
 
 
 def report(
@@ -34,6 +32,8 @@ def report(
     mild: str = "stroke_mild",
     severe: str = "stroke_severe",
     seed: int = 0,
+    environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
+    exoskeleton: str | None = None,
 ) -> int:
     """Rebuild tables and figures: learning curves, tracking over help, patients over time, the worst patient.
 
@@ -44,8 +44,11 @@ def report(
         mild: population of the first patient over time.
         severe: population of the second.
         seed: of these patients.
+        environment: of the patients over time, by id; that of the evaluations or trainings where it is not given.
+        exoskeleton: of the patients over time: device by name or YAML file, or changes of the default one as JSON.
     """
     require_matplotlib()
+    used = None if environment is None else environment_id(environment)
     trainings, evaluations = collected(runs)
     check_writable(out / "report.md")
     lines = ["# Report", ""]
@@ -55,7 +58,8 @@ def report(
         lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
     shown = _shown(policy_names, evaluations, trainings)
     if shown:
-        settings = evaluations[0].get("settings", {}) if evaluations else {"repetitions": repetitions_of(shown)}
+        settings = evaluations[0].get("settings", {}) if evaluations else repeated(shown, None)
+        settings = {**settings, **device_settings(exoskeleton), "environment": used or _place(trainings, evaluations)}
         lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed, settings)
     if shown and evaluations:
         lines += _worst(out, shown, evaluations[0])
@@ -65,78 +69,14 @@ def report(
     return 0
 
 
-def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], list[dict[str, Any]]]:
-    """Learning curves by folder, and evaluations; those of the same patients are one.
-
-    Raises:
-        InputError: a path is neither, or a file is not whole.
-    """
-    if not paths:
-        raise InputError("folders of trainings or evaluation.json files are wanted.")
-    trainings: dict[Path, list[dict[str, Any]]] = {}
-    evaluations: dict[tuple[Any, ...], dict[str, Any]] = {}
-    for path in paths:
-        if (path / RECORD).is_file():
-            trainings[path] = _json(path / EVALUATIONS) if (path / EVALUATIONS).is_file() else []
-        elif path.is_file() or (path / EVALUATION).is_file():
-            found = _json(path if path.is_file() else path / EVALUATION)
-            if not isinstance(found, dict) or not {"population", "patients", "seed", "policies"} <= found.keys():
-                raise InputError(f"'{path}' is not an evaluation.")
-            settings = json.dumps(found.get("settings", {}), sort_keys=True)
-            key = (*(found[k] for k in ("population", "patients", "seed")), settings, *found.get("loads", ()))
-            known = evaluations.setdefault(key, {**found, "policies": {}})
-            known["policies"] |= found["policies"]
-        else:
-            raise InputError(f"'{path}' is neither the folder of a training nor an evaluation.")
-    for known in evaluations.values():
-        known["policies"] |= pooled(known["policies"], known["seed"])
-        first = next(iter(known["policies"].values()))["episodes"]
-        for one in known["policies"].values():
-            one["difference"] = differences(one["episodes"], first, known["seed"], one.get("trainings", 1))
-    return trainings, list(evaluations.values())
+def _place(trainings: Mapping[Path, Any], evaluations: Sequence[Mapping[str, Any]]) -> str:
+    """Id of the environment that a report is about."""
+    named = [e["environment"] for e in evaluations] + [read_record(path)["environment"] for path in trainings]
+    return environment_id(named[0]) if named else ENVIRONMENT
 
 
-def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Trainings that differ in nothing but the seed, as one: its numbers are means over the trainings."""
-    groups: dict[tuple[str, str | None], list[Any]] = {}
-    for one in policies.values():
-        name, seeded, _ = one["title"].rpartition(", seed ")
-        if seeded:
-            groups.setdefault((name, one.get("training")), []).append(one)
-    found: dict[str, Any] = {}
-    for (name, _), ones in groups.items():
-        titles, parts = [one["title"] for one in ones], [one["episodes"] for one in ones]
-        seeds = {title.rpartition(", seed ")[2].split()[0] for title in titles}
-        if len(parts) == len(seeds) > 1 and len({len(part) for part in parts}) == 1:
-            episodes, title = [e for part in parts for e in part], f"{name}, {len(parts)} seeds"
-            title += f" ({len(found) + 1})" if title in found else ""
-            found[title] = {
-                "title": title, "trainings": len(parts), "episodes": episodes, "of": titles,
-                "summary": summary(episodes, seed, len(parts)),
-                "summary_able": summary(able_ones(episodes), seed, len(parts)),
-            }  # fmt: skip
-    return found
-
-
-def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read: {error}.") from None
-
-
-def grouped(trainings: Mapping[Path, list[dict[str, Any]]]) -> list[Group]:
-    """Trainings of one configuration together."""
-    found: dict[str, list[Path]] = {}
-    for path in trainings:
-        content = Config.read(path / CONFIG).content()
-        found.setdefault(json.dumps(content, sort_keys=True), []).append(path)
-    names = [read_record(paths[0])["algorithm"] for paths in found.values()]
-    groups = []
-    for name, paths in zip(names, found.values(), strict=True):
-        label = name if names.count(name) == 1 else f"{name}, {paths[0].name}"
-        groups.append(Group(label, [trainings[p] for p in paths if trainings[p]]))
-    return [g for g in groups if g.curves]
+CURVE = {"return": "best return", "tracking_rms_deg": "tracking [deg]", "device_work_share": "device share"}
+"""Measures of a training in its table, with their heads."""
 
 
 def _trainings(out: Path, trainings: Mapping[Path, list[dict[str, Any]]]) -> list[str]:
@@ -147,8 +87,8 @@ def _trainings(out: Path, trainings: Mapping[Path, list[dict[str, Any]]]) -> lis
     lines = [
         "## Trainings",
         "",
-        "| run | algorithm | seed | steps | time [s] | best return | tracking [deg] | device share |",
-        f"|{'---|' * 8}",
+        f"| run | algorithm | seed | steps | time [s] | {' | '.join(CURVE.values())} |",
+        f"|{'---|' * (5 + len(CURVE))}",
     ]
     for path, curve in trainings.items():
         record = read_record(path)
@@ -157,7 +97,7 @@ def _trainings(out: Path, trainings: Mapping[Path, list[dict[str, Any]]]) -> lis
             lines.append(f"| {who} | no evaluation yet | | | | |")
             continue
         best, last = max(curve, key=lambda e: e["return"]), curve[-1]
-        numbers = " | ".join(_number(best[k]) for k in ("return", "tracking_rms_deg", "device_work_share"))
+        numbers = " | ".join(_number(best.get(name)) for name in CURVE)
         lines.append(f"| {who} | {last['steps']} | {last['seconds']:.0f} | {numbers} |")
     return [*lines, "", *(["![Learning curves](learning_curves.png)", ""] if groups else [])]
 
@@ -168,9 +108,11 @@ def _number(value: float | None) -> str:
 
 def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
     """Figure and table of an evaluation."""
-    for found in results["policies"].values():
-        for estimate in found["summary"].values():
+    for policy in results["policies"].values():
+        for estimate in policy["summary"].values():
             estimate.update({k: float("nan") for k, v in estimate.items() if v is None})
+    if not all(name in p["summary"] for p in results["policies"].values() for name in report_figures.PARETO):
+        return whole_table(results)
     report_figures.pareto(out / f"pareto{suffix}.png", results)
     return [*whole_table(results), f"![Tracking over the share of the device](pareto{suffix}.png)", ""]
 
@@ -179,10 +121,10 @@ def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], training
     """The two policies to show over time."""
     if names:
         if len(set(names)) != 2:
-            raise InputError(f"--policies {' '.join(names)}: two different names are wanted.")
+            raise InputError(f"--policies {' '.join(names)}: expected two different names.")
         return [find_policy(name) for name in names]
-    found = evaluations[0]["policies"] if evaluations else {}
-    ranked = sorted(found, key=lambda n: found[n]["summary"]["return"]["value"], reverse=True)
+    evaluated = evaluations[0]["policies"] if evaluations else {}
+    ranked = sorted(evaluated, key=lambda n: evaluated[n]["summary"]["return"]["value"], reverse=True)
     learned = [n for n in ranked if n not in POLICIES] + [str(path) for path, curve in trainings.items() if curve]
     baselines = [n for n in ranked if n in POLICIES] + ["pid", "none"]
     shown: list[Policy] = []
@@ -197,8 +139,8 @@ def _patients(
     out: Path, shown: Sequence[Policy], whom: Mapping[str, str], seed: int, settings: Mapping[str, Any]
 ) -> list[str]:
     """Figure of patients over time."""
-    columns = {title: [course(p, source, seed, **settings) for p in shown] for title, source in whom.items()}
-    report_figures.courses(out / "patients.png", columns)
+    columns = {title: [time_course(p, source, seed, **settings) for p in shown] for title, source in whom.items()}
+    report_figures.time_courses(out / "patients.png", columns)
     return ["## Patients over time", "", "![Two patients under two policies](patients.png)", ""]
 
 
@@ -208,20 +150,34 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
     if judged is None:
         return []
     episodes = results["policies"][judged.name]["episodes"]
-    worst = max(episodes, key=lambda e: (e["measures"]["unsafe"], e["measures"]["tracking_rms_deg"]))
-    why = "ended early" if worst["measures"]["unsafe"] else "largest error"
-    columns = {f"{why} of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
-    report_figures.courses(out / "worst_patient.png", columns)
+    worst = max(episodes, key=_badness)
     m = worst["measures"]
-    said = worst["event"] or f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
-    return [f"## Worst patient of {judged.title}", "", said, "", "![The worst patient](worst_patient.png)", ""]
+    why = "ended early" if m["unsafe"] else "largest error" if "tracking_rms_deg" in m else "least return"
+    columns = {f"{why} of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
+    report_figures.time_courses(out / "worst_patient.png", columns)
+    sentence = worst["event"] or f"return {m['return']:.4g}"
+    if not worst["event"] and "tracking_rms_deg" in m:
+        sentence = f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
+    return [f"## Worst patient of {judged.title}", "", sentence, "", "![The worst patient](worst_patient.png)", ""]
 
 
-def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -> Course:
-    """An episode of an evaluation once more: to the last bit where its population is a shipped one."""
-    settings = results.get("settings", {})
-    for name in shipped_populations():
-        if population(name).title == results["population"]:
-            load = {"load": one["load"]} if results.get("loads") else None
-            return course(policy, name, one["seed"], load, **settings)
-    return course(policy, one["patient"], one["seed"], {k: one[k] for k in ("load", "reference")}, **settings)
+def _badness(one: Mapping[str, Any]) -> tuple[float, float]:
+    """What the worst episode has most of: an early end, then error, or lack of return where there is no reference."""
+    m = one["measures"]
+    return m["unsafe"], m.get("tracking_rms_deg", -m["return"])
+
+
+def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -> TimeCourse:
+    """An episode of an evaluation once more: to the last bit where its population is a shipped one.
+
+    Another version of the environment draws other patients; then, and where the population is not known, patient, load
+    and movement are those that were kept of the episode.
+    """
+    environment = environment_id(results.get("environment", ENVIRONMENT))
+    settings = {**results.get("settings", {}), "environment": environment}
+    known = [name for name in shipped_populations() if population(name).title == results["population"]]
+    if known and results.get("environment", ENVIRONMENT) == environment:
+        load = {"load": one["load"]} if results.get("loads") else None
+        return time_course(policy, known[0], one["seed"], load, **settings)
+    kept = {k: one[k] for k in ("load", "reference") if k in one}
+    return time_course(policy, one["patient"], one["seed"], kept, **settings)

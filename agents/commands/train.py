@@ -12,7 +12,12 @@ from typing import Annotated, Any
 from tqdm import tqdm
 from tyro.conf import arg
 
-from dms_core.errors import DmsError, InputError, extra
+from dms_core.config_files import configs
+from dms_core.errors import InputError
+
+from ..environment import PROGRAM, environment_id
+from ..evaluation.episode import judged
+from ..training.usable import checked_config, require_training
 
 STOPPED = 130
 """Exit status of a run that was told to stop."""
@@ -25,30 +30,35 @@ def train(
     changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
     out: Path | None = None,
     resume: Path | None = None,
+    environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
 ) -> int:
     """Train a policy; Ctrl-C saves a checkpoint, and --resume goes on from the last one.
 
     Args:
-        config: YAML file in the format of rl_zoo3, see configs/agents.
+        config: YAML file in the format of rl_zoo3, as in configs/agents.
         seed: decides all that is random.
         changes: values that replace those of the configuration, for example n_timesteps=1e5 policy_kwargs.net_arch=[32]
             training.eval_every=1e4.
         out: folder of the training, empty or new; out/training/ALGORITHM_SEED where it is not given.
         resume: folder of a training to go on with; of the values only n_timesteps and training.* may then be changed.
+        environment: id of the section of the configuration to take; module:ID where another package registers it.
     """
     require_training()
-    from agents.training.run import TrainingRun
+    from ..training.run import TrainingRun
+
+    if environment is not None:
+        environment_id(environment)
 
     with _stopping() as stop:
-        folder, used, seed = _begun(config, seed, changes, out, resume)
+        folder, used, seed = _begun(config, seed, changes, out, resume, environment)
         with folder.locked(), _bar(used.n_timesteps) as report:
-            run = TrainingRun(folder, used, seed, report, stop)
-            for said in _outlook(run.steps, run.end, used.n_timesteps):
-                tqdm.write(said)
+            run = TrainingRun(folder, used, seed, report, judged, stop)
+            for line in _outlook(run.steps, run.end, used.n_timesteps):
+                tqdm.write(line)
             done = run.run()
     if not done:
-        said = f"stopped after {run.steps} steps, an unfinished round is dropped"
-        print(f"{said}; go on with: python -m agents train --resume {folder.path}")
+        stopped = f"stopped after {run.steps} steps, an unfinished round is dropped"
+        print(f"{stopped}; go on with: {PROGRAM} train --resume {folder.path}")
         return STOPPED
     best = max(run.evaluations, key=lambda e: e["return"])
     print(f"{run.steps} steps in {run.seconds:.0f} s; best return {best['return']:.5g} after {best['steps']} steps")
@@ -56,34 +66,23 @@ def train(
     return 0
 
 
-def _outlook(steps: int, end: int, wanted: int) -> Iterator[str]:
-    """What is ahead, where it is not just as wanted."""
-    if steps >= wanted:
-        yield f"already complete: {steps} of {wanted} steps; give more with --set n_timesteps=..."
+def _outlook(steps: int, end: int, planned: int) -> Iterator[str]:
+    """What is ahead, where it is not just what the configuration says."""
+    if steps >= planned:
+        yield f"already complete: {steps} of {planned} steps; give more with --set n_timesteps=..."
         return
     if steps > 0:
         yield f"going on after {steps} steps"
-    if end > wanted:
-        yield f"whole rounds end after {end} steps, not {wanted}"
+    if end > planned:
+        yield f"whole rounds end after {end} steps, not {planned}"
 
 
-def require_training() -> None:
-    """Say what to install where training is not possible.
-
-    Raises:
-        DmsError: a package is missing.
-    """
-    try:
-        import sb3_contrib  # noqa: F401
-        import stable_baselines3  # noqa: F401
-        import tensorboard  # noqa: F401
-    except ImportError as error:
-        raise DmsError(f"training needs {error.name}. {extra('train')}") from None
-
-
-def _begun(config: Path | None, seed: int, changes: tuple[str, ...], out: Path | None, resume: Path | None) -> Any:
+def _begun(
+    config: Path | None, seed: int, changes: tuple[str, ...], out: Path | None, resume: Path | None,
+    environment: str | None,
+) -> Any:  # fmt: skip
     """Folder, configuration and seed of a new training or of one to go on with."""
-    from agents.training.run_folder import RunFolder
+    from ..training.run_folder import RunFolder
 
     if resume is not None:
         if config is not None or out is not None:
@@ -96,43 +95,14 @@ def _begun(config: Path | None, seed: int, changes: tuple[str, ...], out: Path |
         folder = RunFolder(resume)
         return folder, *folder.go_on(changes)
     if config is None:
-        raise InputError("--config FILE or --resume DIR is needed; see configs/agents.")
+        raise InputError(f"expected --config FILE or --resume DIR; there are files in {configs() / 'agents'}.")
     if seed < 0:
-        raise InputError(f"seed = {seed}; a whole number from 0 is wanted.")
+        raise InputError(f"seed = {seed}: expected a whole number from 0.")
     # A mistake shall not leave a folder behind.
-    used = checked_config(config, changes)
+    used = checked_config(config, changes, environment)
     folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
     folder.begin(used, seed)
     return folder, used, seed
-
-
-def checked_config(path: Path, changes: tuple[str, ...]) -> Any:
-    """A configuration that can be trained.
-
-    Raises:
-        InputError: names file, key and value.
-    """
-    from agents.training.algorithms import arguments
-    from agents.training.config import Config
-
-    found = Config.read(path, changes)
-    try:
-        arguments(found)
-        check_environment(found.env_kwargs)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return found
-
-
-def check_environment(env_kwargs: dict[str, Any]) -> None:
-    """Refuses settings that no environment can be made with.
-
-    Raises:
-        InputError: names the setting.
-    """
-    from exo_env.envs.elbow_lift import ElbowLiftEnv
-
-    ElbowLiftEnv(**env_kwargs)
 
 
 @contextlib.contextmanager
@@ -172,15 +142,19 @@ def _bar(steps: int) -> Iterator[Any]:
         yield report
 
 
+SHOWN = (
+    ("return", "return", ".5g", ""), ("tracking_rms_deg", "tracking", ".3g", " deg"),
+    ("device_work_share", "work of the device", ".2f", ""), ("unsafe", "unsafe", ".2f", ""),
+)  # fmt: skip
+"""Measures in the line of an evaluation, with label, format and unit."""
+
+
 def line(evaluation: dict[str, Any]) -> str:
     """An evaluation in words."""
-
-    def shown(name: str, digits: str) -> str:
-        value = evaluation[name]
-        return "-" if value is None else format(value, digits)
-
-    tracking = f"tracking {shown('tracking_rms_deg', '.3g')} deg"
-    return (
-        f"{evaluation['steps']:>9} steps: return {shown('return', '.5g')}, {tracking}, "
-        f"work of the device {shown('device_work_share', '.2f')}, unsafe {shown('unsafe', '.2f')}"
-    )
+    parts = []
+    for name, label, digits, unit in SHOWN:
+        # An environment without the reading has no such measure.
+        if name in evaluation:
+            value = evaluation[name]
+            parts.append(f"{label} {'-' if value is None else format(value, digits)}{unit}")
+    return f"{evaluation['steps']:>9} steps: {', '.join(parts)}"

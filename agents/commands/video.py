@@ -11,12 +11,15 @@ import numpy as np
 from tqdm import tqdm
 from tyro.conf import arg
 
-from agents.evaluation.evaluate import world_of
-from agents.policies.learned import find_policy, repetitions_of
-from agents.policies.policy import Policy
 from dms_core.errors import DmsError, InputError, extra
 from dms_core.output_file import check_writable
 from exo_env.patient.population import population
+
+from ..environment import ENVIRONMENT, environment_id
+from ..evaluation.episode import world_of
+from ..policies.learned import find_policy
+from ..policies.policy import Policy
+from .options import device_settings, repeated
 
 BAND, FONT, MOST = 44, 18, 4
 """Height of the titles and size of their letters [pixel], and policies that fit side by side."""
@@ -31,23 +34,28 @@ def video(
     patient: str = "stroke_severe",
     seed: int = 0,
     repetitions: int | None = None,
+    environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
+    exoskeleton: str | None = None,
 ) -> int:
     """Film policies side by side, with the same patient, load and repetition.
 
     Args:
-        policy_names: one to four, see `python -m agents policies`, or folders of trained ones.
+        policy_names: one to four: names of the command `policies`, folders of trained ones, or module:Class.
         out: .mp4, or .gif; without ffmpeg an .mp4 becomes a .gif.
         patient: population to draw from.
         seed: of the episode.
         repetitions: of the movement; as the trained policies learned, 1 without one, where not given.
+        environment: in which, by id; module:ID where another package registers it.
+        exoskeleton: device by name or YAML file, or changes of the default one as JSON.
     """
     if not 1 <= len(set(policy_names)) == len(policy_names) <= MOST:
-        raise InputError(f"--policy {' '.join(policy_names)}: one to {MOST} different names are wanted.")
+        raise InputError(f"--policy {' '.join(policy_names)}: expected one to {MOST} different names.")
     if out.suffix not in (".mp4", ".gif"):
-        raise InputError(f"output '{out}': a name that ends in .mp4 or .gif is wanted.")
+        raise InputError(f"output '{out}': expected a name that ends in .mp4 or .gif.")
+    environment_id(environment)
     used = [find_policy(name) for name in policy_names]
-    often = repetitions_of(used, repetitions)
-    stages = [Stage(policy, patient, seed, repetitions=often) for policy in used]
+    settings = device_settings(exoskeleton) | repeated(used, repetitions)
+    stages = [Stage(policy, patient, seed, environment, **settings) for policy in used]
     out = _possible(out)
     check_writable(out)
     rate, total = stages[0].rate, stages[0].length
@@ -64,12 +72,15 @@ class Stage:
         policy: that assists.
         patient: population to draw from.
         seed: of the episode.
+        environment: its id.
         settings: further ones of the environment.
     """
 
-    def __init__(self, policy: Policy, patient: str, seed: int, **settings: Any) -> None:
+    def __init__(
+        self, policy: Policy, patient: str, seed: int, environment: str = ENVIRONMENT, **settings: Any
+    ) -> None:
         self.policy = policy
-        self.env = world_of(policy, population(patient).model_dump(), render_mode="rgb_array", **settings)
+        self.env = world_of(policy, population(patient).model_dump(), environment, render_mode="rgb_array", **settings)
         self.observation, self.info = self.env.reset(seed=seed)
         policy.reset(self.env)
         world: Any = self.env.unwrapped
@@ -114,9 +125,9 @@ def band(width: int, title: str, event: str) -> np.ndarray:
     return pygame.surfarray.array3d(surface).swapaxes(0, 1)
 
 
-def _shown(found: Iterator[np.ndarray], bar: tqdm, every: int) -> Iterator[np.ndarray]:
+def _shown(whole: Iterator[np.ndarray], bar: tqdm, every: int) -> Iterator[np.ndarray]:
     """Every so many pictures, with the bar moved."""
-    for k, picture in enumerate(found):
+    for k, picture in enumerate(whole):
         bar.update()
         if k % every == 0:
             yield picture
@@ -143,7 +154,7 @@ def _possible(out: Path) -> Path:
     return out
 
 
-def _write(out: Path, found: Iterator[np.ndarray], rate: int) -> None:
+def _write(out: Path, shown: Iterator[np.ndarray], rate: int) -> None:
     """Write the file whole or not at all."""
     import imageio.v2 as imageio
 
@@ -155,7 +166,7 @@ def _write(out: Path, found: Iterator[np.ndarray], rate: int) -> None:
     try:
         writer: Any = imageio.get_writer(temporary, **options)
         with writer:
-            for picture in found:
+            for picture in shown:
                 writer.append_data(picture)
         os.replace(temporary, out)
     except OSError as error:

@@ -11,6 +11,7 @@ from typing import Any
 from dms_core.errors import DmsError, extra
 
 ROOT = Path(__file__).resolve().parents[2]
+"""Folder of the packages: the checkout, or where the wheel is installed."""
 RETRIES = 3
 """Times a share is done again when its worker is lost."""
 POLL = 0.5
@@ -52,20 +53,20 @@ def share_out(
     try:
         remote = ray.remote(num_cpus=1, max_retries=RETRIES)(function)
         running = {remote.remote(*share): k for k, share in enumerate(shares)}
-        found: list[Any] = [None] * len(shares)
+        results: list[Any] = [None] * len(shares)
         while running:
             ready, _ = ray.wait(list(running), timeout=POLL)
             for one in ready:
                 k = running.pop(one)
-                found[k] = ray.get(one)
+                results[k] = ray.get(one)
                 done(k)
             waiting()
-        return found
+        return results
     except ray.exceptions.RayTaskError as error:
         raise DmsError(str(error.cause) if isinstance(error.cause, DmsError) else f"a worker failed: {error}") from None
     except ray.exceptions.RayError as error:
-        said = " ".join(str(error).split())[:200]
-        raise DmsError(f"a share lost its worker {RETRIES + 1} times; not enough memory? Ray says: {said}") from None
+        reason = " ".join(str(error).split())[:200]
+        raise DmsError(f"a share lost its worker {RETRIES + 1} times; not enough memory? Ray says: {reason}") from None
     finally:
         ray.shutdown()
 
@@ -83,11 +84,15 @@ def _started(address: str | None, cpus: int | None) -> Any:
             ray.init("local", num_cpus=cpus, include_dashboard=False, runtime_env=environment, **quiet)
         else:
             _reach(address)
-            ray.init(address, runtime_env={"working_dir": str(ROOT), "excludes": LEFT_BEHIND}, **quiet)
+            # A checkout travels along; where the wheel is installed here, it has to be on the cluster, too.
+            checkout = (
+                {"working_dir": str(ROOT), "excludes": LEFT_BEHIND} if (ROOT / "pyproject.toml").is_file() else {}
+            )
+            ray.init(address, runtime_env=checkout, **quiet)
     except (ConnectionError, ValueError, RuntimeError, OSError) as error:
-        said = " ".join(str(error).split())[:200]
+        reason = " ".join(str(error).split())[:200]
         hint = "" if address is None or os.environ.get("RAY_AUTH_TOKEN") else f" {TOKEN}"
-        raise DmsError(f"Ray at '{address or 'local'}' cannot be reached: {said}{hint}") from None
+        raise DmsError(f"Ray at '{address or 'local'}' cannot be reached: {reason}{hint}") from None
     return ray
 
 

@@ -1,33 +1,30 @@
-"""The environment for RLlib (https://docs.ray.io/en/latest/rllib), which makes environments by names of its own.
+"""The environments for RLlib (https://docs.ray.io/en/latest/rllib), which makes environments by names of its own.
 
-    from agents.distributed.rllib import register
+    from exo_agents.distributed.rllib import register
     from ray.rllib.algorithms.ppo import PPOConfig
 
-    register()
-    config = PPOConfig().environment("exo/ElbowLift-v0", env_config={"patient": "mixed"})
+    config = PPOConfig().environment(register(), env_config={"patient": "mixed"})
 
-RLlib of Ray 2.60 wants gymnasium 1.2.2, which this environment runs with too (`make test-rllib`).
+In a checkout the first line is `from agents.distributed.rllib import register`. RLlib of Ray 2.60 wants gymnasium
+1.2.2, which these environments run with too (`make test-rllib`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import gymnasium
-
-from agents.evaluation.evaluate import ENVIRONMENT
-from agents.training.config import ENVIRONMENT_ID
+from ..environment import ENVIRONMENT, environment_id, make
 
 
-def make(settings: Mapping[str, Any]) -> gymnasium.Env:
-    """An environment from RLlib's `env_config`."""
-    return gymnasium.make(ENVIRONMENT, disable_env_checker=True, **dict(settings))
+def register(environment: str = ENVIRONMENT) -> str:
+    """Tell RLlib of an environment.
 
+    Args:
+        environment: its id, with the module where another package registers it.
 
-def register() -> str:
-    """Tell RLlib of the environment; returns the name it then has."""
+    Returns:
+        The name that it then has.
+    """
     from ray.tune.registry import register_env
 
-    register_env(ENVIRONMENT_ID, make)
-    return ENVIRONMENT_ID
+    name = environment_id(environment)
+    register_env(name, lambda settings: make(environment, **dict(settings)))
+    return name

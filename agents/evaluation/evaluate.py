@@ -7,31 +7,67 @@ the difference is known better than either (`differences`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 
-from agents.evaluation.measures import MEASURES, Record, measured
-from agents.evaluation.statistics import CONFIDENCE, RESAMPLES, estimate, interquartile_mean, mean
-from agents.policies.policy import Policy
 from dms_core.errors import InputError
 from exo_env.patient.ability import ABLE
 from exo_env.patient.population import Source, population
 
-ENVIRONMENT = "exo_env:exo/ElbowLift-v0"
+from ..environment import ENVIRONMENT, environment_id, patient_seeds
+from ..policies.policy import Policy
+from .episode import episode, world_of
+from .measures import measures_among
+from .statistics import CONFIDENCE, RESAMPLES, estimate, interquartile_mean, mean
+
 COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
 """Measures whose differences between policies are estimated, patient by patient."""
 Case = tuple[int, float | None]
 """Seed of an episode and its load [kg], None for the one that the seed draws."""
 
 
-def patient_seeds(seed: int, patients: int) -> list[int]:
-    """Seeds of the episodes; more patients keep those of fewer."""
-    return [int(x) for x in np.random.SeedSequence(seed).generate_state(patients)]
+@dataclass(frozen=True)
+class Plan:
+    """What every policy of an evaluation is run on.
+
+    Raises:
+        InputError: the population or the environment is unknown, or a number is not usable.
+    """
+
+    population: Source
+    """By name, YAML file, or what else `patient` of the environment takes."""
+    patients: int
+    """How many; one episode each, or one a load."""
+    seed: int
+    """Decides the patients and the bootstrap."""
+    loads: tuple[float, ...] = ()
+    """Loads that each patient lifts [kg]; one that the seed draws, where none is given."""
+    environment: str = ENVIRONMENT
+    """Its id, with or without the module that registers it, which other processes then import, too."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Further settings of the environment."""
+    id: str = field(init=False)
+    """Under which the environment is registered."""
+    title: str = field(init=False)
+    """Of the population."""
+    patient: dict[str, Any] = field(init=False)
+    """Fields of the population, which other processes can be given."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self.patients, self.seed)
+        source = population(self.population)
+        object.__setattr__(self, "id", environment_id(self.environment))
+        object.__setattr__(self, "title", source.title)
+        object.__setattr__(self, "patient", source.model_dump())
+
+    @property
+    def cases(self) -> list[Case]:
+        """Every patient with every load."""
+        return cases_of(self.seed, self.patients, self.loads)
 
 
 def cases_of(seed: int, patients: int, loads: Sequence[float] = ()) -> list[Case]:
@@ -46,6 +82,7 @@ def evaluate(
     seed: int,
     *,
     loads: Sequence[float] = (),
+    environment: str = ENVIRONMENT,
     progress: Callable[[str], None] | None = None,
     **settings: Any,
 ) -> dict[str, Any]:
@@ -57,6 +94,7 @@ def evaluate(
         patients: how many; one episode each, or one a load.
         seed: of the patients and of the bootstrap.
         loads: that each patient lifts [kg]; one that the seed draws, where none is given.
+        environment: its id.
         progress: called with the name of the policy after each episode.
         settings: further ones of the environment.
 
@@ -65,20 +103,10 @@ def evaluate(
         the same over the patients who can do something (ability of at least `able`).
 
     Raises:
-        InputError: the population is unknown, or a number is not usable.
+        InputError: the population or the environment is unknown, or a number is not usable.
     """
-    check_numbers(patients, seed)
-    source, cases = population(patients_of), cases_of(seed, patients, loads)
-    episodes = [episodes_of(one, source.model_dump(), cases, settings, progress) for one in policies]
-    return results_of(policies, episodes, source.title, patients, seed, loads, settings)
-
-
-def world_of(policy: Policy, patient: Source, **settings: Any) -> gymnasium.Env:
-    """The environment that a policy acts in; `settings`: further ones of it."""
-    return gymnasium.make(
-        ENVIRONMENT, disable_env_checker=True, patient=patient, action_mode=policy.action_mode,
-        observation=list(policy.observation), **settings,
-    )  # fmt: skip
+    plan = Plan(patients_of, patients, seed, tuple(loads), environment, settings)
+    return results_of(policies, [episodes_of(one, plan, plan.cases, progress) for one in policies], plan)
 
 
 def check_numbers(patients: int, seed: int) -> None:
@@ -89,83 +117,63 @@ def check_numbers(patients: int, seed: int) -> None:
     """
     for name, value, least in (("patients", patients, 1), ("seed", seed, 0)):
         if value < least:
-            raise InputError(f"{name} = {value}; a whole number from {least} is wanted.")
+            raise InputError(f"{name} = {value}: expected a whole number from {least}.")
 
 
 def episodes_of(
-    one: Policy,
-    patient: dict[str, Any],
-    cases: Sequence[Case],
-    settings: dict[str, Any],
-    progress: Callable[[str], None] | None = None,
+    one: Policy, plan: Plan, cases: Sequence[Case], progress: Callable[[str], None] | None = None
 ) -> list[dict[str, Any]]:
     """Episodes of a policy, one a case."""
-    env, found = world_of(one, patient, **settings), []
+    env, episodes = world_of(one, plan.patient, plan.environment, **plan.settings), []
     for number, load in cases:
-        found.append({"seed": number, **episode(env, one, number, load)})
+        episodes.append({"seed": number, **episode(env, one, number, load)})
         if progress is not None:
             progress(one.name)
     env.close()
-    return found
+    return episodes
 
 
-def results_of(
-    policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], title: str, patients: int, seed: int,
-    loads: Sequence[float] = (), settings: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:  # fmt: skip
+def results_of(policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], plan: Plan) -> dict[str, Any]:
     """What `evaluate` returns, from the episodes of each policy."""
-    found: dict[str, Any] = {}
-    titles = [one.title for one in policies]
+    by_name: dict[str, Any] = {}
+    titles, left = [one.title for one in policies], dict[str, list[str]]()
     for one, those in zip(policies, episodes, strict=True):
         shared = f" ({Path(one.name).name})" if titles.count(one.title) > 1 else ""
-        found[one.name] = {
+        for e in those:
+            left |= e.pop("left_out", {})
+        by_name[one.name] = {
             "title": one.title + shared, "training": one.training,
-            "summary": summary(those, seed), "summary_able": summary(able_ones(those), seed),
-            "difference": differences(those, episodes[0], seed), "episodes": those,
+            "summary": summary(those, plan.seed),
+            "summary_able": summary(able_ones(those), plan.seed, names=those[0]["measures"]),
+            "difference": differences(those, episodes[0], plan.seed), "episodes": those,
         }  # fmt: skip
     return {
-        "population": title, "patients": patients, "loads": list(loads), "seed": seed, "settings": dict(settings or {}),
+        "environment": plan.id, "population": plan.title, "patients": plan.patients,
+        "loads": list(plan.loads), "seed": plan.seed, "settings": dict(plan.settings),
         "statistic": "interquartile mean", "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE,
-        "policies": found,
+        "left_out": left, "policies": by_name,
     }  # fmt: skip
 
 
-def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> dict[str, Any]:
-    """Measures of one episode, with load, repetition and what ended it; `load` [kg] in place of the one drawn."""
-    world: Any = env.unwrapped
-    observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
-    info = drawn
-    acting.reset(env)
-    record = Record(world.episode.repetition, world.period)
-    record.add(world.readings())
-    over = False
-    while not over:
-        observation, reward, terminated, truncated, info = env.step(acting(observation, info))
-        record.rewards.append(float(reward))
-        record.add(world.readings())
-        over = terminated or truncated
-    record.event = info.get("event")
-    return {
-        **{k: drawn[k] for k in ("load", "ability", "reference", "patient")},
-        "event": record.event,
-        "measures": measured(record),
-    }
-
-
-def summary(episodes: list[dict[str, Any]], seed: int, trainings: int = 1) -> dict[str, dict[str, float]]:
+def summary(
+    episodes: list[dict[str, Any]], seed: int, trainings: int = 1, names: Iterable[str] | None = None
+) -> dict[str, dict[str, float]]:
     """Estimate of each measure over the patients, by name.
 
     Args:
         episodes: of one policy, or of several trainings one after another.
         seed: of the bootstrap.
         trainings: how many.
+        names: of the measures; those of the first episode where they are not given.
     """
-    found = {}
-    for m in MEASURES:
+    estimates = {}
+    for m in measures_among(episodes[0]["measures"] if names is None else names):
         values = by_training(episodes, m.name, trainings)
         # A generator for each measure and not for each policy: the same resamples for all policies.
-        found[m.name] = asdict(estimate(values, mean if m.rate else interquartile_mean, np.random.default_rng(seed)))
-    return found
+        estimates[m.name] = asdict(
+            estimate(values, mean if m.rate else interquartile_mean, np.random.default_rng(seed))
+        )
+    return estimates
 
 
 def by_patient(episodes: list[dict[str, Any]], measure: str) -> np.ndarray:
@@ -186,13 +194,15 @@ def differences(
     episodes: list[dict[str, Any]], others: list[dict[str, Any]], seed: int, trainings: int = 1
 ) -> dict[str, dict[str, float]]:
     """Estimates of the mean difference to another policy, patient by patient; `trainings` as in `summary`."""
-    found = {}
+    estimates = {}
     for name in COMPARED:
+        if not all(name in e["measures"] for e in (*episodes, *others)):
+            continue
         values = by_training(episodes, name, trainings) - by_patient(others, name)
-        found[name] = asdict(estimate(values, mean, np.random.default_rng(seed)))
-    return found
+        estimates[name] = asdict(estimate(values, mean, np.random.default_rng(seed)))
+    return estimates
 
 
 def able_ones(episodes: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Episodes of patients who can do something with their load."""
-    return [e for e in episodes if e["ability"] >= ABLE]
+    """Episodes of patients who can do something with their load; all where the environment does not say."""
+    return [e for e in episodes if e.get("ability", ABLE) >= ABLE]

@@ -3,11 +3,15 @@
 Work is mechanical and positive: of each party, the integral of the positive part of its moment times the joint's rate.
 Shares are of the sum of both, so that a party which brakes the other earns nothing. An episode that an event cuts short
 is measured up to its end.
+
+Some measures need readings that not every environment has; where one is missing, the measure is left out. Return,
+reward terms, unsafe episodes, solver failures and length are always there.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -19,7 +23,48 @@ from exo_env.tasks.movement import Repetition
 SPARC_CUTOFF, SPARC_THRESHOLD, SPARC_PADDING = 10.0, 0.05, 4
 """Largest frequency [Hz], least amplitude [-], doublings of the transform's length (Balasubramanian et al. 2015)."""
 FEWEST_SAMPLES = 8
-"""Of a speed profile worth a smoothness."""
+"""Samples that a speed profile needs at least for a smoothness."""
+REWARD = "reward."
+"""Before the name of a reward term."""
+MOVEMENT = "reference"
+"""What `info` of a reset calls the movement, which smoothness needs beside the readings."""
+
+
+@dataclass
+class Record:
+    """Readings of an episode, one a control time."""
+
+    repetition: Repetition | None
+    """The movement, None where the environment has none."""
+    period: float
+    """Control period [s]."""
+    readings: list[dict[str, float]] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+    terms: dict[str, float] = field(default_factory=dict)
+    """Sum of each reward term times its weight."""
+    event: str | None = None
+    solver_failed: bool = False
+
+    def add(self, readings: Mapping[str, float]) -> None:
+        """The readings of a control time."""
+        self.readings.append({name: readings[name] for name in READ if name in readings})
+
+    def add_step(self, reward: float, info: Mapping[str, Any]) -> None:
+        """What a step gave."""
+        self.rewards.append(float(reward))
+        weights = info.get("reward_weights", {})
+        for name, value in info.get("reward_terms", {}).items():
+            self.terms[name] = self.terms.get(name, 0.0) + float(value) * float(weights.get(name, 1.0))
+        self.solver_failed |= bool(info.get("solver_failed", False))
+
+    def column(self, name: str) -> np.ndarray:
+        """A reading over time, shape (n,)."""
+        return np.array([r[name] for r in self.readings])
+
+    def lacks(self, reads: Iterable[str]) -> list[str]:
+        """Which of some readings the environment does not have."""
+        here = self.readings[0].keys() if self.readings else ()
+        return [name for name in reads if name not in here and not (name == MOVEMENT and self.repetition is not None)]
 
 
 @dataclass(frozen=True)
@@ -29,68 +74,80 @@ class Measure:
     name: str
     label: str
     unit: str
+    of: Callable[[Record], float]
+    """Its number for an episode, NaN where it cannot be had."""
+    reads: tuple[str, ...] = ()
+    """Readings that it needs."""
     rate: bool = False
     """The numbers are 0 or 1, whose mean says how many; their interquartile mean would hide the few."""
 
 
-MEASURES = (
-    Measure("return", "return", "-"),
-    Measure("tracking_rms_deg", "tracking, rms", "deg"),
-    Measure("tracking_peak_deg", "tracking, peak", "deg"),
-    Measure("device_work_share", "work of the device", "-"),
-    Measure("patient_work_share", "work of the patient", "-"),
-    Measure("peak_tension_N", "peak tension", "N"),
-    Measure("peak_reaction_N", "peak elbow reaction", "N"),
-    Measure("smoothness_sparc", "smoothness (SPARC)", "-"),
-    Measure("unsafe", "unsafe episodes", "-", rate=True),
-)
+def _tracking_rms(record: Record) -> float:
+    return float(np.sqrt(np.mean(np.degrees(record.column("tracking_error")) ** 2)))
 
 
-@dataclass
-class Record:
-    """Readings of an episode, one a control time."""
-
-    repetition: Repetition
-    period: float
-    """Control period [s]."""
-    readings: list[dict[str, float]] = field(default_factory=list)
-    rewards: list[float] = field(default_factory=list)
-    event: str | None = None
-
-    def add(self, readings: dict[str, float]) -> None:
-        """The readings of a control time."""
-        self.readings.append({name: readings[name] for name in READ})
-
-    def column(self, name: str) -> np.ndarray:
-        """A reading over time, shape (n,)."""
-        return np.array([r[name] for r in self.readings])
+def _tracking_peak(record: Record) -> float:
+    return float(np.abs(np.degrees(record.column("tracking_error"))).max())
 
 
-READ = (
-    "time", "tracking_error", "elbow_angle.rate", "exo_angle.rate", "muscle_moment", "exo_moment", "agonist_tension",
-    "antagonist_tension", "elbow_reaction",
-)  # fmt: skip
-
-
-def measured(record: Record) -> dict[str, Any]:
-    """Every measure of an episode, by name; one that cannot be had is NaN."""
-    error = np.degrees(record.column("tracking_error"))
-    times, rate = record.column("time"), record.column("elbow_angle.rate")
-    patient = positive_work(times, record.column("muscle_moment") * rate)
+def _shares(record: Record) -> tuple[float, float]:
+    """Shares of device and patient in the positive work."""
+    times = record.column("time")
+    patient = positive_work(times, record.column("muscle_moment") * record.column("elbow_angle.rate"))
     device = positive_work(times, record.column("exo_moment") * record.column("exo_angle.rate"))
     both = patient + device
-    tension = max(record.column("agonist_tension").max(), record.column("antagonist_tension").max())
-    return {
-        "return": math.fsum(record.rewards),
-        "tracking_rms_deg": float(np.sqrt(np.mean(error**2))),
-        "tracking_peak_deg": float(np.abs(error).max()),
-        "device_work_share": device / both if both > 0.0 else math.nan,
-        "patient_work_share": patient / both if both > 0.0 else math.nan,
-        "peak_tension_N": float(tension),
-        "peak_reaction_N": float(record.column("elbow_reaction").max()),
-        "smoothness_sparc": smoothness(record.repetition, times, rate, record.period),
-        "unsafe": float(record.event is not None),
-    }
+    return (device / both, patient / both) if both > 0.0 else (math.nan, math.nan)
+
+
+def _peak_tension(record: Record) -> float:
+    return float(max(record.column("agonist_tension").max(), record.column("antagonist_tension").max()))
+
+
+def _smoothness(record: Record) -> float:
+    assert record.repetition is not None
+    return smoothness(record.repetition, record.column("time"), record.column("elbow_angle.rate"), record.period)
+
+
+WORK = ("time", "muscle_moment", "elbow_angle.rate", "exo_moment", "exo_angle.rate")
+TENSIONS = ("agonist_tension", "antagonist_tension")
+MEASURES = (
+    Measure("return", "return", "-", lambda r: math.fsum(r.rewards)),
+    Measure("tracking_rms_deg", "tracking, rms", "deg", _tracking_rms, ("tracking_error",)),
+    Measure("tracking_peak_deg", "tracking, peak", "deg", _tracking_peak, ("tracking_error",)),
+    Measure("device_work_share", "work of the device", "-", lambda r: _shares(r)[0], WORK),
+    Measure("patient_work_share", "work of the patient", "-", lambda r: _shares(r)[1], WORK),
+    Measure("peak_tension_N", "peak tension", "N", _peak_tension, TENSIONS),
+    Measure(
+        "peak_reaction_N", "peak elbow reaction", "N", lambda r: float(r.column("elbow_reaction").max()),
+        ("elbow_reaction",),
+    ),
+    Measure("smoothness_sparc", "smoothness (SPARC)", "-", _smoothness, ("time", "elbow_angle.rate", MOVEMENT)),
+    Measure("unsafe", "unsafe episodes", "-", lambda r: float(r.event is not None), rate=True),
+    Measure("solver_failures", "solver failures", "-", lambda r: float(r.solver_failed), rate=True),
+    Measure("length_s", "length of the episode", "s", lambda r: len(r.rewards) * r.period),
+)  # fmt: skip
+READ = tuple(dict.fromkeys(name for m in MEASURES for name in m.reads if name != MOVEMENT))
+"""Readings that are kept."""
+
+
+def measured(record: Record) -> dict[str, float]:
+    """Every measure of an episode whose readings there are, by name; one that cannot be had is NaN."""
+    numbers = {m.name: m.of(record) for m in MEASURES if not record.lacks(m.reads)}
+    return numbers | {f"{REWARD}{name}": value for name, value in record.terms.items()}
+
+
+def left_out(record: Record) -> dict[str, list[str]]:
+    """Measures that an environment does not allow, with the readings that it lacks."""
+    return {m.name: lacking for m in MEASURES if (lacking := record.lacks(m.reads))}
+
+
+def measures_among(names: Iterable[str]) -> list[Measure]:
+    """The measures of some names, in order: those of MEASURES, then the reward terms."""
+    known = list(names)
+    terms = [name for name in known if name.startswith(REWARD)]
+    return [m for m in MEASURES if m.name in known] + [
+        Measure(name, f"reward of {name.removeprefix(REWARD)}", "-", lambda r: math.nan) for name in terms
+    ]
 
 
 def positive_work(times: np.ndarray, power: np.ndarray) -> float:
@@ -111,8 +168,8 @@ def smoothness(repetition: Repetition, times: np.ndarray, rate: np.ndarray, peri
     backs = lifts + repetition.duration + repetition.pause
     edges = [*np.stack([lifts, backs], axis=1).flat, math.inf]
     parts = [rate[(times >= a) & (times < b)] for a, b in pairwise(edges)]
-    found = [sparc(np.abs(part), 1.0 / period) for part in parts]
-    return float(np.mean([x for x in found if math.isfinite(x)])) if np.isfinite(found).any() else math.nan
+    values = [sparc(np.abs(part), 1.0 / period) for part in parts]
+    return float(np.mean([x for x in values if math.isfinite(x)])) if np.isfinite(values).any() else math.nan
 
 
 def sparc(speed: np.ndarray, frequency: float) -> float:

@@ -71,8 +71,8 @@ def recruited(patient: Patient, planned: np.ndarray, full: np.ndarray, period: f
     """
     rate = patient.slacking_rate
     kept, gained = math.exp(-rate * period), -math.expm1(-rate * period) / rate if rate > 0.0 else period
-    later, found = 0.0, np.empty(len(planned))
+    later, recovered = 0.0, np.empty(len(planned))
     for i in reversed(range(len(planned))):
         later = later * kept + planned[i] * gained
-        found[i] = later
-    return patient.effort_recovery * found + patient.feedback_gain * full
+        recovered[i] = later
+    return patient.effort_recovery * recovered + patient.feedback_gain * full

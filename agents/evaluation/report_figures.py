@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents.evaluation.figure import COLOURS
-from agents.evaluation.time_course import Course
 from exo_env.rendering.panels import legend, panels, save
+
+from .figure import COLOURS
+from .time_course import TimeCourse
 
 CURVES = (
     ("return", "return of an episode"),
@@ -35,8 +36,10 @@ class Group:
 
 def learning_curves(path: Path, groups: Sequence[Group]) -> None:
     """Mean over the seeds and, as a band, the lowest to the highest of them."""
-    figure, axes = panels(1, len(CURVES), (3.4 * len(CURVES), 3.4), sharex="col")
-    for ax, (name, label) in zip(axes.flat, CURVES, strict=True):
+    first = next((e for group in groups for curve in group.curves for e in curve), {})
+    shown = [(name, label) for name, label in CURVES if name in first]
+    figure, axes = panels(1, len(shown), (3.4 * len(shown), 3.4), sharex="col")
+    for ax, (name, label) in zip(axes.flat, shown, strict=True):
         for k, group in enumerate(groups):
             steps, values = on_common_steps(group.curves, name)
             colour, n = COLOURS[k % len(COLOURS)], len(group.curves)
@@ -56,7 +59,7 @@ def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) ->
     Returns:
         Steps, shape (m,), and values, shape (curves, m); what could not be measured is bridged.
     """
-    kept = [[(e["steps"], e[name]) for e in curve if e[name] is not None] for curve in curves]
+    kept = [[(e["steps"], e[name]) for e in curve if e.get(name) is not None] for curve in curves]
     kept = [pairs for pairs in kept if pairs]
     if not kept:
         return np.zeros(0), np.zeros((1, 0))
@@ -94,8 +97,8 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
         other.set_xlabel("share of the device: difference [-]")
         other.set_ylabel("tracking error, rms: difference [deg]")
         left_out = [p["title"] for p in policies if p not in near]
-        said = f"mean difference to {policies[0]['title']}, patient by patient"
-        other.set_title(said + (f"\n(far off: {', '.join(left_out)})" if left_out else ""), fontsize=9)
+        what = f"mean difference to {policies[0]['title']}, patient by patient"
+        other.set_title(what + (f"\n(far off: {', '.join(left_out)})" if left_out else ""), fontsize=9)
     percent = 100.0 * results["confidence"]
     figure.supxlabel(f"{results['patients']} patients, {results['population']}; {percent:g} % intervals", fontsize=9)
     legend(figure, ax, 3)
@@ -133,53 +136,76 @@ def _front(ax: Any, policies: Sequence[Mapping[str, Any]]) -> None:
     ax.step(*zip(*best, strict=True), where="post", color="0.7", linewidth=1.0, linestyle=":", zorder=0)
 
 
+DASHES = (0, (4, 2))
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the figure of patients over time: lines of some readings, the second one dashed."""
+
+    label: str
+    reads: tuple[str, ...]
+    lines: str = ""
+    """What the lines are, where there are two."""
+    of: Callable[..., np.ndarray] | None = None
+    """What is drawn of the readings where it is not they themselves."""
+
+    def draw(self, ax: Any, y: Mapping[str, np.ndarray], colour: str, policy: str) -> None:
+        """The lines of one episode."""
+        columns = [y[name] for name in self.reads]
+        shown = columns if self.of is None else [self.of(*columns)]
+        for k, values in enumerate(shown):
+            dashed: dict[str, Any] = {"linestyle": DASHES, "linewidth": 1.0} if k > 0 else {"label": policy}
+            ax.plot(y["time"], values, color=colour, **dashed)
+
+
 ROWS = (
-    ("elbow flexion [deg]", ""),
-    ("error [deg]", ""),
-    ("rope tension [N]", "solid: agonist, dashed: antagonist"),
-    ("moment [Nm]", "solid: device, dashed: muscles"),
-    ("effort [-]", ""),
+    Row("elbow flexion [deg]", ("elbow_angle.angle",), of=np.degrees),
+    Row("error [deg]", ("elbow_angle.angle", "reference"), of=lambda angle, psi: np.degrees(angle) - np.degrees(psi)),
+    Row("rope tension [N]", ("agonist_tension", "antagonist_tension"), "solid: agonist, dashed: antagonist"),
+    Row("moment [Nm]", ("exo_moment", "muscle_moment"), "solid: device, dashed: muscles"),
+    Row("effort [-]", ("effort",)),
 )
 
 
-def courses(path: Path, columns: Mapping[str, Sequence[Course]]) -> None:
+def time_courses(path: Path, columns: Mapping[str, Sequence[TimeCourse]]) -> None:
     """Patients over time, a column a patient, a colour a policy."""
-    figure, axes = panels(len(ROWS), len(columns), (1.2 + 4.4 * len(columns), 9.6), sharex="col", sharey="row")
-    for column, (title, found) in zip(axes.T, columns.items(), strict=True):
-        y = max((one.columns for one in found), key=lambda c: len(c["time"]))
-        column[0].plot(y["time"], np.degrees(y["reference"]), color="0.55", linewidth=3.5, alpha=0.6, label="reference")
-        for k, one in enumerate(found):
-            _course(column, one, COLOURS[k])
-        column[0].set_title(f"{title}\n{found[0].who}", fontsize=9)
+    readings = {name for ones in columns.values() for one in ones for name in one.columns}
+    rows = [row for row in ROWS if readings.issuperset(row.reads)]
+    figure, axes = panels(
+        len(rows), len(columns), (1.2 + 4.4 * len(columns), 1.9 * len(rows) + 0.1), sharex="col", sharey="row"
+    )
+    for column, (title, ones) in zip(axes.T, columns.items(), strict=True):
+        y = max((one.columns for one in ones), key=lambda c: len(c["time"]))
+        if "reference" in y:
+            degrees = np.degrees(y["reference"])
+            column[0].plot(y["time"], degrees, color="0.55", linewidth=3.5, alpha=0.6, label="reference")
+        for k, one in enumerate(ones):
+            for ax, row in zip(column, rows, strict=True):
+                row.draw(ax, one.columns, COLOURS[k], one.policy)
+            _mark_event(column[0], one, COLOURS[k])
+        column[0].set_title(f"{title}\n{ones[0].who}", fontsize=9)
         column[-1].set_xlabel("time [s]")
         column[-1].set_ylim(bottom=-0.05)
-    for ax, (label, lines) in zip(axes[:, 0], ROWS, strict=True):
-        ax.set_ylabel(label)
-        for other in axes[list(axes[:, 0]).index(ax)] if lines else ():
-            other.set_title(lines, fontsize=7, loc="right", pad=2, color="0.3")
+    for line, row in zip(axes, rows, strict=True):
+        line[0].set_ylabel(row.label)
+        for other in line if row.lines else ():
+            other.set_title(row.lines, fontsize=7, loc="right", pad=2, color="0.3")
     figure.align_ylabels()
     legend(figure, axes[0, 0], 4)
     save(figure, path)
 
 
-def _course(column: Any, one: Course, colour: str) -> None:
-    """The lines of one episode, and a cross where an event ended it."""
-    angle, error, tension, moment, effort = column
-    y, dashes = one.columns, (0, (4, 2))
-    t, shown = y["time"], np.degrees(y["elbow_angle.angle"])
-    angle.plot(t, shown, color=colour, label=one.policy)
-    error.plot(t, shown - np.degrees(y["reference"]), color=colour)
-    tension.plot(t, y["agonist_tension"], color=colour)
-    tension.plot(t, y["antagonist_tension"], color=colour, linestyle=dashes, linewidth=1.0)
-    moment.plot(t, y["exo_moment"], color=colour)
-    moment.plot(t, y["muscle_moment"], color=colour, linestyle=dashes, linewidth=1.0)
-    effort.plot(t, y["effort"], color=colour)
-    if one.event is not None:
-        angle.plot(t[-1], shown[-1], "x", color=colour, markersize=9, markeredgewidth=2.5)
-        angle.annotate(
-            _short(one.event), (t[-1], shown[-1]), xytext=(8, 0), textcoords="offset points", va="center", fontsize=7,
-            color=colour,
-        )  # fmt: skip
+def _mark_event(ax: Any, one: TimeCourse, colour: str) -> None:
+    """A cross where an event ended an episode, and what it was."""
+    angle = one.columns.get("elbow_angle.angle")
+    if one.event is None or angle is None:
+        return
+    end = one.columns["time"][-1], float(np.degrees(angle[-1]))
+    ax.plot(*end, "x", color=colour, markersize=9, markeredgewidth=2.5)
+    ax.annotate(
+        _short(one.event), end, xytext=(8, 0), textcoords="offset points", va="center", fontsize=7, color=colour
+    )
 
 
 def _short(event: str) -> str:

@@ -9,15 +9,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.evaluation.evaluate import COMPARED, able_ones, differences
-from agents.evaluation.measures import MEASURES
-from agents.evaluation.statistics import Estimate
-from agents.policies.baselines import POLICIES
+from ..environment import ENVIRONMENT
+from ..policies.baselines import POLICIES
+from .evaluate import COMPARED, able_ones, differences
+from .measures import MEASURES, measures_among
+from .statistics import Estimate
 
 OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
 """Measures that are printed of them."""
+SHORT = {"tracking_rms_deg": "tracking, rms [deg]", "device_work_share": "device's share of work"}
+"""Measures of the short table beside the return, and their heads."""
 LEAST = 1e-6
-"""Of what is printed, in the unit of any measure."""
+"""Least number that is printed as one, in the unit of any measure; what is below is 0."""
 
 
 def statistic(results: Mapping[str, Any]) -> str:
@@ -30,22 +33,23 @@ def heading(results: Mapping[str, Any]) -> str:
     """Whom a table is about."""
     often, loads = results.get("settings", {}).get("repetitions", 1), results.get("loads", ())
     count = results["patients"]
-    said = f"{count} patient{'s' * (count > 1)} of '{results['population']}', seed {results['seed']}"
-    said += f", loads {' '.join(f'{x:g}' for x in loads)} kg" if loads else ""
-    return said + (f", {often} repetitions" if often > 1 else "")
+    whom = f"{count} patient{'s' * (count > 1)} of '{results['population']}', seed {results['seed']}"
+    whom += f", loads {' '.join(f'{x:g}' for x in loads)} kg" if loads else ""
+    whom += f", {often} repetitions" if often > 1 else ""
+    return whom + (f", in {where}" if (where := results.get("environment", ENVIRONMENT)) != ENVIRONMENT else "")
 
 
 def short_table(results: Mapping[str, Any]) -> str:
     """A row a policy: return, its difference to the first policy, tracking, device's share, unsafe episodes."""
     names, policies = _short_names(results["policies"]), list(results["policies"].values())
-    rows = [["", "return", f"difference to {names[0]}", "tracking, rms [deg]", "device's share of work", "unsafe"]]
+    shown = {k: label for k, label in SHORT.items() if all(k in p["summary"] for p in policies)}
+    rows = [["", "return", f"difference to {names[0]}", *shown.values(), "unsafe"]]
     for name, p in zip(names, policies, strict=True):
-        shown = (p["summary"][k] for k in ("return", "tracking_rms_deg", "device_work_share"))
-        returned, tracking, share = (_cell(Estimate(**one)) for one in shown)
+        returned, *others = (_cell(Estimate(**p["summary"][k])) for k in ("return", *shown))
         compared = "" if name == names[0] else _cell(Estimate(**p["difference"]["return"]))
         # A percentage would round a single one away.
         unsafe = f"{sum(e['measures']['unsafe'] for e in p['episodes']):.0f} of {len(p['episodes'])}"
-        rows.append([name, returned, compared, tracking, share, unsafe])
+        rows.append([name, returned, compared, *others, unsafe])
     if len(policies) == 1:
         rows = [[*row[:2], *row[3:]] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -59,9 +63,22 @@ def short_table(results: Mapping[str, Any]) -> str:
 
 def _short_names(names: Iterable[str]) -> list[str]:
     """Policies by name, trained ones by the last part of their folder where these differ."""
-    found = list(names)
-    short = [Path(name).name for name in found]
-    return short if len(set(short)) == len(found) else found
+    whole = list(names)
+    short = [Path(name).name for name in whole]
+    return short if len(set(short)) == len(whole) else whole
+
+
+def left_out_lines(results: Mapping[str, Any]) -> list[str]:
+    """A line on the measures that the environment does not allow; none where it allows all."""
+    left = results.get("left_out", {})
+    if not left:
+        return []
+    labels = {m.name: m.label for m in MEASURES}
+    lacking = dict.fromkeys(reading for readings in left.values() for reading in readings)
+    return [
+        f"Left out: {', '.join(labels.get(name, name) for name in left)}; "
+        f"{results['environment']} has no reading {', '.join(lacking)}."
+    ]
 
 
 def whole_table(results: Mapping[str, Any]) -> list[str]:
@@ -71,19 +88,19 @@ def whole_table(results: Mapping[str, Any]) -> list[str]:
     """
     head, *rows = table_rows(results)
     return [
-        f"## {heading(results)}", "", f"{statistic(results).capitalize()}.", "",
+        f"## {heading(results)}", "", f"{statistic(results).capitalize()}.", *left_out_lines(results), "",
         f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
     ]  # fmt: skip
 
 
 def _rows(policies: Mapping[str, Any], summary: str, measures: Sequence[str]) -> list[list[str]]:
     """A row a measure."""
-    found = []
-    for m in MEASURES:
-        if m.name in measures:
+    rows = []
+    for m in measures_among(measures):
+        if all(m.name in p[summary] for p in policies.values()):
             label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
-            found.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in policies.values())])
-    return found
+            rows.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in policies.values())])
+    return rows
 
 
 def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
@@ -93,18 +110,18 @@ def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
     everybody = policies[names[0]]["episodes"]
     able = able_ones(everybody)
     count, apart = len({e["seed"] for e in able}), len(able) < len(everybody)
-    rows = [["", *names], *_rows(policies, "summary", [m.name for m in MEASURES])]
+    rows = [["", *names], *_rows(policies, "summary", list(policies[names[0]]["summary"]))]
     if apart:
         rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
         rows += _rows(policies, "summary_able", OF_THE_ABLE)
     for other in dict.fromkeys([names[0], best_baseline(policies) or names[0]] if len(names) > 1 else []):
-        those, said = policies[other]["episodes"], f"mean difference to {other}, patient by patient"
-        for head, kept in ((said, list), (f"{said}, of these {count}", able_ones))[: 2 if apart else 1]:
-            found = {
+        those, what = policies[other]["episodes"], f"mean difference to {other}, patient by patient"
+        for head, kept in ((what, list), (f"{what}, of these {count}", able_ones))[: 2 if apart else 1]:
+            between = {
                 n: {"d": differences(kept(p["episodes"]), kept(those), seed, p.get("trainings", 1))}
                 for n, p in policies.items()
             }
-            rows += [[head, *("" for _ in names)], *_rows(found, "d", COMPARED)]
+            rows += [[head, *("" for _ in names)], *_rows(between, "d", COMPARED)]
     return rows
 
 

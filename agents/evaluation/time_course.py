@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from agents.evaluation.evaluate import world_of
-from agents.policies.policy import Policy
+from dms_core.renamed import replaced
 from exo_env.patient.population import Source, population
+
+from ..environment import ENVIRONMENT
+from ..policies.policy import Policy
+from .episode import world_of
 
 READ = (
     "time", "elbow_angle.angle", "reference", "agonist_tension", "antagonist_tension", "muscle_moment", "exo_moment",
@@ -18,30 +21,39 @@ READ = (
 
 
 @dataclass(frozen=True)
-class Course:
+class TimeCourse:
     """Readings of an episode at control times, without noise."""
 
     policy: str
     """Title."""
     patient: dict[str, Any]
-    load: float
-    """[kg]."""
+    load: float | None
+    """[kg], None where there is none."""
     columns: dict[str, np.ndarray]
-    """Shape (n,) each, by the names of READ."""
+    """Shape (n,) each, by those names of READ that the environment has."""
     event: str | None
     """What ended the episode early."""
 
     @property
     def who(self) -> str:
         """The patient in words."""
-        p = self.patient
-        flexors, extensors = p["maximum_activation_flexors"], p["maximum_activation_extensors"]
-        return f"commands {flexors:.0%} of the flexors, {extensors:.0%} of the extensors; {self.load:.1f} kg"
+        shares = [
+            f"{self.patient[f'maximum_activation_{muscles}']:.0%} of the {muscles}"
+            for muscles in ("flexors", "extensors")
+            if f"maximum_activation_{muscles}" in self.patient
+        ]
+        load = [] if self.load is None else [f"{self.load:.1f} kg"]
+        return "; ".join(([f"commands {', '.join(shares)}"] if shares else []) + load)
 
 
-def course(
-    policy: Policy, patient: Source, seed: int, options: dict[str, Any] | None = None, **settings: Any
-) -> Course:
+def time_course(
+    policy: Policy,
+    patient: Source,
+    seed: int,
+    options: dict[str, Any] | None = None,
+    environment: str = ENVIRONMENT,
+    **settings: Any,
+) -> TimeCourse:
     """Run an episode.
 
     Args:
@@ -49,9 +61,10 @@ def course(
         patient: population to draw from.
         seed: of the episode.
         options: of the environment's reset.
+        environment: its id.
         settings: further ones of the environment.
     """
-    env = world_of(policy, population(patient).model_dump(), **settings)
+    env = world_of(policy, population(patient).model_dump(), environment, **settings)
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=options)
     policy.reset(env)
@@ -61,5 +74,8 @@ def course(
         rows.append(world.readings())
         over = terminated or truncated
     env.close()
-    columns = {name: np.array([row[name] for row in rows]) for name in READ}
-    return Course(policy.title, drawn["patient"], drawn["load"], columns, info.get("event"))
+    columns = {name: np.array([row[name] for row in rows]) for name in READ if name in rows[0]}
+    return TimeCourse(policy.title, drawn.get("patient", {}), drawn.get("load"), columns, info.get("event"))
+
+
+__getattr__ = replaced(__name__, {"Course": "It is now TimeCourse.", "course": "It is now time_course."})

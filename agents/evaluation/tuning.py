@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from agents.evaluation.evaluate import episode, patient_seeds, world_of
-from agents.policies.baselines import POLICIES
-from agents.policies.tuned import Range
 from dms_core.errors import InputError
 
+from ..environment import ENVIRONMENT, patient_seeds
+from ..policies.baselines import POLICIES
+from ..policies.tuned import Range
+from .episode import judged, world_of
+
 POPULATION, STREAM = "mixed", 2**32
-"""Training population by default; added to a seed, so that the patients are not those of an evaluation with it."""
+"""Training population by default; STREAM is added to a seed, so that no patients are those of an evaluation with it."""
 SPREAD = 0.1
 """Standard deviation around the best, as a share of each range."""
 BATCH = 8
@@ -44,13 +46,17 @@ def tunable() -> dict[str, dict[str, Range]]:
     return {name: kind.ranges for name, kind in POLICIES.items() if kind.ranges}
 
 
-def trial(policy: str, numbers: dict[str, float], population: str, seeds: list[int], settings: dict[str, Any]) -> Try:
+def trial(
+    policy: str, numbers: dict[str, float], population: str, seeds: list[int], settings: dict[str, Any],
+    environment: str = ENVIRONMENT,
+) -> Try:  # fmt: skip
     """Means over the episodes of some seeds."""
     acting = POLICIES[policy](**numbers)
-    env = world_of(acting, population, **settings)
-    found = [episode(env, acting, seed)["measures"] for seed in seeds]
+    env = world_of(acting, population, environment, **settings)
+    measures = judged(env, acting, seeds)
     env.close()
-    return Try(policy, numbers, {m: float(np.nanmean([f[m] for f in found])) for m in MEASURED})
+    known = [name for name in MEASURED if name in measures[0]]
+    return Try(policy, numbers, {name: float(np.nanmean([m[name] for m in measures])) for name in known})
 
 
 def tune(
@@ -60,6 +66,7 @@ def tune(
     seed: int,
     *,
     population: str = POPULATION,
+    environment: str = ENVIRONMENT,
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
     **settings: Any,
@@ -72,6 +79,7 @@ def tune(
         patients: episodes of each.
         seed: of the patients and of the search.
         population: of the patients, by name or YAML file.
+        environment: its id.
         workers: processes.
         progress: called with the name of the policy after each try.
         settings: further ones of the environment.
@@ -88,28 +96,30 @@ def tune(
         ("workers", workers, 1),
     ):
         if not isinstance(value, int) or value < least:
-            raise InputError(f"{name} = {value!r}; a whole number from {least} is wanted.")
+            raise InputError(f"{name} = {value!r}: expected a whole number from {least}.")
     ranges, seeds = tunable()[policy], patient_seeds(STREAM + seed, patients)
     generator = np.random.default_rng(seed)
-    found: list[tuple[np.ndarray, Try]] = []
+    done: list[tuple[np.ndarray, Try]] = []
 
     def run(places: np.ndarray, pool: ProcessPoolExecutor) -> None:
         """Try these places, each from 0 to 1 in every range."""
         rows = [{n: r.at(x) for (n, r), x in zip(ranges.items(), place, strict=True)} for place in places]
-        tried = pool.map(trial, repeat(policy), rows, repeat(population), repeat(seeds), repeat(settings))
+        tried = pool.map(
+            trial, repeat(policy), rows, repeat(population), repeat(seeds), repeat(settings), repeat(environment)
+        )
         for place, one in zip(places, tried, strict=True):
-            found.append((place, one))
+            done.append((place, one))
             if progress is not None:
                 progress(policy)
 
     with ProcessPoolExecutor(workers) as pool:
         first = tries // 2
         run(qmc.LatinHypercube(len(ranges), rng=generator).random(first), pool)
-        while len(found) < tries:
-            best = max(found, key=_return)[0]
-            count = min(BATCH, tries - len(found))
+        while len(done) < tries:
+            best = max(done, key=_return)[0]
+            count = min(BATCH, tries - len(done))
             run(np.clip(best + SPREAD * generator.standard_normal((count, len(ranges))), 0.0, 1.0), pool)
-    return [one for _, one in sorted(found, key=_return, reverse=True)]
+    return [one for _, one in sorted(done, key=_return, reverse=True)]
 
 
 def _return(entry: tuple[np.ndarray, Try]) -> float:

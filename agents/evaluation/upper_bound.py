@@ -1,8 +1,5 @@
 r"""What could be reached: for each patient the best of many schedules that know the patient.
 
-    python -m agents.evaluation.upper_bound --population evaluation --patients 24 --repetitions 4 --seed 0 \\
-        --out docs/ceiling.csv
-
 A schedule is the device's PID with an authority and a setpoint below the reference, one pair until the arm is up and
 another one after, in every repetition the same. All schedules are tried on the same episode in one batch, and the best
 is picked with hindsight, which no policy has; beside it stands the schedule that is best for all patients together. It
@@ -13,22 +10,18 @@ the same run, since an episode goes on as a shorter one ends.
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-import tyro
-from tqdm import tqdm
 
-from agents.evaluation.evaluate import check_numbers, patient_seeds
-from agents.evaluation.recruitment import most_recruited
-from dms_core.errors import SimulationError
-from dms_core.output_file import check_writable, whole_file
-from exo_env.drives.drive import PidSetpoint
-from exo_env.envs.vector_env import ElbowLiftVectorEnv
-from exo_env.world.control_period import READING
+from dms_core.errors import InputError, SimulationError, choices
+from exo_env.tasks.movement import Repetition
 from exo_env.world.episode import Episode
+
+from ..environment import ENVIRONMENT, make_vector, patient_seeds
+from .recruitment import most_recruited
 
 TRIES = 96
 LARGEST_LAG = 3.0
@@ -55,7 +48,7 @@ class Tried:
     ability: float
     returns: np.ndarray
     square: np.ndarray
-    """Of the tracking error [deg^2]."""
+    """Sum of the squared tracking error [deg^2]."""
     works: np.ndarray
     """Positive, of device and patient [W]; shape (2, repetitions, TRIES)."""
     effort: np.ndarray
@@ -66,7 +59,7 @@ class Tried:
     """psi - theta of the PID at the control times [rad]."""
 
     def row(self, shared: int, n: int) -> dict[str, float]:
-        """Of the first n repetitions, efforts of the last one; `shared` is the best schedule of all patients.
+        """What is written of the first n repetitions, efforts of the last one; `shared` is the best schedule of all.
 
         `least_share` is the least of the schedules with an error of at most MORE_ERROR above the PID's, `linear_share`
         what would be left if such errors recruited as much as they can and every bit of effort became work.
@@ -86,72 +79,91 @@ class Tried:
         }  # fmt: skip
 
 
-def tried_on(worlds: ElbowLiftVectorEnv, seed: int, tried: np.ndarray) -> Tried:
-    """All schedules on one patient."""
-    worlds.reset(seed=[seed] * worlds.num_envs)
-    episode, period = worlds.envs[0].episode, worlds.envs[0].period
-    movement, times = episode.repetition, episode.times[:-1]
-    n = movement.count
+NEEDS = ("tracking_error", "exo_moment", "exo_angle.rate", "muscle_moment", "elbow_angle.rate", "effort")
+"""Readings without which there is no upper bound."""
+
+
+def upper_bound(
+    population: str,
+    patients: int,
+    seed: int,
+    *,
+    repetitions: int = 1,
+    environment: str = ENVIRONMENT,
+    progress: Callable[[], object] = lambda: None,
+    **settings: Any,
+) -> tuple[list[Tried], np.ndarray]:
+    """Try schedules on each patient.
+
+    Args:
+        population: of the patients, by name or YAML file.
+        patients: how many.
+        seed: of the patients.
+        repetitions: of the movement in an episode.
+        environment: its id; one with a PID and a reference.
+        progress: called after each patient.
+        settings: further ones of the environment.
+
+    Returns:
+        What came of each patient, and the schedules, shape (TRIES, 4).
+
+    Raises:
+        InputError: the environment lacks a reading that is needed.
+    """
+    worlds = make_vector(
+        environment, TRIES, action_mode="pid_setpoint", patient=population, repetitions=repetitions,
+        autoreset_mode="Disabled", **settings,
+    )  # fmt: skip
+    tried, results = schedules(np.random.default_rng(seed)), []
+    for one in patient_seeds(seed, patients):
+        results.append(tried_on(worlds, one, tried, repetitions))
+        progress()
+    worlds.close()
+    return results, tried
+
+
+def best_together(results: list[Tried], n: int) -> int:
+    """The schedule that is best for all patients in the first n repetitions."""
+    return int(np.argmax(np.sum([one.returns[:n].sum(axis=0) for one in results], axis=0)))
+
+
+def tried_on(worlds: Any, seed: int, tried: np.ndarray, n: int = 1) -> Tried:
+    """All schedules on one patient.
+
+    Args:
+        worlds: the vector environment, a world a schedule.
+        seed: of the patient.
+        tried: the schedules, shape (TRIES, 4).
+        n: repetitions of the movement in an episode.
+    """
+    _, drawn = worlds.reset(seed=[seed] * worlds.num_envs)
+    envs = worlds.envs
+    lacking = [name for name in NEEDS if name not in envs[0].readings()]
+    lacking += ["reference"] if "reference" not in drawn else []
+    if lacking:
+        raise InputError(f"an upper bound needs readings that this environment does not have: {choices(lacking)}.")
+    episode, period = envs[0].episode, envs[0].period
+    numbers: dict[str, Any] = {k: float(x[0]) for k, x in drawn["reference"].items() if not k.startswith("_")}
+    movement = Repetition(**numbers)
+    times = episode.times[:-1]
     shape, up, steps = (n, TRIES), movement.rest + movement.duration, len(times) // n
-    found = Tried(
-        seed, episode.need.ability, np.zeros(shape), np.zeros(shape), np.zeros((2, *shape)), np.zeros(shape), steps,
-        episode, np.zeros(len(times)),
+    sums = Tried(
+        seed, float(drawn["ability"][0]), np.zeros(shape), np.zeros(shape), np.zeros((2, *shape)), np.zeros(shape),
+        steps, episode, np.zeros(len(times)),
     )  # fmt: skip
     for step, time in enumerate(times):
         k = min(step // steps, n - 1)
         authority, lag = tried[:, 0:2].T if time - k * steps * period < up else tried[:, 2:4].T
-        actions = np.stack([-np.radians(lag) / PidSetpoint().setpoint_range, 2.0 * authority - 1.0], axis=1)
-        found.error[step] = -worlds.envs[0].packed.values.reading[READING.error]
-        _, rewards, terminated, _, told = worlds.step(actions)
+        actions = np.stack([-np.radians(lag) / envs[0].drive.setpoint_range, 2.0 * authority - 1.0], axis=1)
+        sums.error[step] = -envs[0].readings()["tracking_error"]
+        _, rewards, terminated, _, infos = worlds.step(actions)
         if terminated.any():
             raise SimulationError(f"a schedule ended the episode of seed {seed} at {time:.2f} s; none should.")
-        r = np.array([env.packed.values.reading for env in worlds.envs])
-        found.returns[k] += rewards
-        found.square[k] += told["tracking_error_deg"] ** 2
-        found.effort[k] += told["effort"]
-        found.works[0, k] += np.maximum(r[:, READING.exo_moment] * r[:, READING.hinge_rate], 0.0)
-        found.works[1, k] += np.maximum(r[:, READING.muscle_moment] * r[:, READING.rate], 0.0)
-    return found
-
-
-def ceiling(out: Path, population: str = "evaluation", patients: int = 24, repetitions: int = 1, seed: int = 0) -> None:
-    """Try schedules on each patient and write a table.
-
-    Args:
-        out: CSV file.
-        population: of the patients, by name or YAML file.
-        patients: how many.
-        repetitions: of the movement in an episode.
-        seed: of the patients.
-    """
-    check_numbers(patients, seed)
-    check_writable(out)
-    worlds = ElbowLiftVectorEnv(
-        TRIES, action_mode="pid_setpoint", patient=population, repetitions=repetitions, autoreset_mode="Disabled"
-    )
-    tried = schedules(np.random.default_rng(seed))
-    seeds = tqdm(patient_seeds(seed, patients), unit="patient", disable=None)
-    found = [tried_on(worlds, one, tried) for one in seeds]
-    worlds.close()
-    counts = range(1, repetitions + 1)
-    shared = [int(np.argmax(np.sum([one.returns[:n].sum(axis=0) for one in found], axis=0))) for n in counts]
-    rows = [one.row(best, n) for one in found for n, best in zip(counts, shared, strict=True)]
-    options = f"--population {population} --patients {patients} --repetitions {repetitions} --seed {seed}"
-    with whole_file(out) as file:
-        file.write(f"# python -m agents.evaluation.upper_bound {options}\n")
-        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
-        writer.writeheader()
-        whole = ("seed", "repetitions")
-        writer.writerows({k: v if k in whole else f"{v:.4g}" for k, v in row.items()} for row in rows)
-    for n, best in zip(counts, shared, strict=True):
-        means = {
-            c: float(np.mean([row[c] for row in rows if row["repetitions"] == n]))
-            for c in rows[0]
-            if c not in ("seed", "ability", "repetitions")
-        }
-        print(f"{patients} patients of '{population}', {n} repetitions, shared schedule {tried[best].round(2)}, means:")
-        print("  " + ", ".join(f"{k} {v:.3g}" for k, v in means.items()))
-
-
-if __name__ == "__main__":
-    tyro.cli(ceiling)
+        readings = [env.readings() for env in envs]
+        error, device, hinge, muscles, rate, effort = (np.array([r[name] for r in readings]) for name in NEEDS)
+        sums.returns[k] += rewards
+        sums.square[k] += np.degrees(error) ** 2
+        sums.effort[k] += effort
+        sums.works[0, k] += np.maximum(device * hinge, 0.0)
+        sums.works[1, k] += np.maximum(muscles * rate, 0.0)
+    return sums

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from agents.policies.learned import LearnedPolicy
-from agents.policies.network import Architecture
 from dms_core.errors import DmsError, extra
+
+from ..policies.learned import LearnedPolicy
+from ..policies.network import Architecture
 
 OPSET, IR_VERSION = 17, 9
 """Old enough for the runtimes of 2023 and later."""

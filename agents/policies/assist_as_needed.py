@@ -21,13 +21,14 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
-from agents.policies.policy import Channels, Policy
-from agents.policies.tuned import Range, numbers
 from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
+
+from .policy import Channels, Policy
+from .tuned import Range, numbers
 
 CENTRES = np.radians(np.arange(0.0, 150.0, 15.0))
 WIDTH = np.radians(15.0)
-"""Of the Gaussians [rad]."""
+"""Standard deviation of the Gaussians [rad]."""
 
 
 class AssistAsNeeded(Policy):
@@ -64,7 +65,7 @@ class AssistAsNeeded(Policy):
         self.weights: np.ndarray | None = None
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
-        """Tensions of the moment wanted; learns from the error of now."""
+        """Tensions that give the moment; the weights learn from the present error."""
         names = ("angle", "rate", "reference", "reference_rate")
         angle, rate, reference, reference_rate = (self._channels.read(observation, n) for n in names)
         error, error_rate = reference - angle, reference_rate - rate
@@ -86,11 +87,11 @@ class AssistAsNeeded(Policy):
 
     def _action(self, moment: float, angle: float) -> np.ndarray:
         """Commands of both ropes that give a moment [Nm]; one of them is slack."""
-        wanted = [max(moment / self._device.moment_arm(rope, angle), 0.0) for rope in (AGONIST, ANTAGONIST)]
-        return np.clip(2.0 * np.array(wanted) / self._largest - 1.0, -1.0, 1.0)
+        tensions = [max(moment / self._device.moment_arm(rope, angle), 0.0) for rope in (AGONIST, ANTAGONIST)]
+        return np.clip(2.0 * np.array(tensions) / self._largest - 1.0, -1.0, 1.0)
 
 
 def gaussians(angle: float) -> np.ndarray:
     """Y at an elbow angle [rad]: shape (n,), sum 1."""
-    found = np.exp(-0.5 * ((angle - CENTRES) / WIDTH) ** 2)
-    return found / found.sum()
+    values = np.exp(-0.5 * ((angle - CENTRES) / WIDTH) ** 2)
+    return values / values.sum()

@@ -2,7 +2,7 @@
 
 none              both ropes slack; at the start the agonist still holds the arm, and lets go as fast as it can
 pid               the paper's PID: the device's own controller, full authority, the reference as its setpoint
-pid_yielding      the same with part of the authority, behind the reference by a constant angle, see yielding.py
+pid_yielding      the same with part of the authority, behind the reference by a constant angle, see lagging_pid.py
 pid_compensated   such a one with part of the tension that arm, device and load need, see compensation.py
 assist_as_needed  learns that tension and forgets it, see assist_as_needed.py
 
@@ -16,11 +16,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.policies.assist_as_needed import AssistAsNeeded
-from agents.policies.compensation import CompensatedPid
-from agents.policies.policy import Policy
-from agents.policies.yielding import YieldingPid
 from dms_core.errors import InputError, choices
+
+from .assist_as_needed import AssistAsNeeded
+from .compensation import CompensatedPid
+from .lagging_pid import LaggingPid
+from .policy import Policy
 
 
 class NoAssistance(Policy):
@@ -29,11 +30,13 @@ class NoAssistance(Policy):
     name, title, action_mode = "none", "no assistance", "rope_tension"
 
     def reset(self, env: gymnasium.Env) -> None:
-        """Nothing to remember."""
+        """How many ropes there are."""
+        assert env.action_space.shape is not None
+        self._ropes = env.action_space.shape
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
-        """No tension wanted."""
-        return np.array([-1.0, -1.0])
+        """Commands of no tension."""
+        return np.full(self._ropes, -1.0)
 
 
 class PidControl(Policy):
@@ -50,7 +53,7 @@ class PidControl(Policy):
 
 
 POLICIES: dict[str, type[Policy]] = {
-    p.name: p for p in (NoAssistance, PidControl, YieldingPid, CompensatedPid, AssistAsNeeded)
+    p.name: p for p in (NoAssistance, PidControl, LaggingPid, CompensatedPid, AssistAsNeeded)
 }
 
 

@@ -22,13 +22,14 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
-from agents.policies.policy import Channels, Policy
-from agents.policies.tuned import Range, numbers
-from agents.policies.yielding import YieldingPid
 from exo_env.ecosystem.arm import Arm, Person
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import AGONIST
 from exo_env.patient.motor_command import InternalModel
+
+from .lagging_pid import LaggingPid
+from .policy import Channels, Policy
+from .tuned import Range, numbers
 
 AHEAD = 0
 """Component of the preview that is 0.1 s ahead."""
@@ -63,7 +64,7 @@ class CompensatedPid(Policy):
 
     name, title, action_mode = "pid_compensated", "PID with compensation", "pid_setpoint"
     observation = ("device", "privileged")
-    ranges: ClassVar[dict[str, Range]] = {"share": Range(0.0, 1.0), **YieldingPid.ranges}
+    ranges: ClassVar[dict[str, Range]] = {"share": Range(0.0, 1.0), **LaggingPid.ranges}
 
     def __init__(self, **given: float) -> None:
         used = numbers(self.name, self.ranges, given)

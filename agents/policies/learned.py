@@ -6,6 +6,7 @@ Nothing in the folder can run code, and nothing here needs PyTorch.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,20 +16,22 @@ import gymnasium
 import numpy as np
 from pydantic import Field
 
-from agents.policies.baselines import POLICIES
-from agents.policies.baselines import policy as baseline
-from agents.policies.network import Architecture, Network
-from agents.policies.policy import Policy
-from agents.policies.safetensors import from_bytes, to_bytes
-from agents.training.config import ENVIRONMENT_ID
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from exo_env.settings import Settings
 
+from ..checkpoint import Store
+from ..environment import PROGRAM, environment_id
+from .baselines import POLICIES
+from .baselines import policy as baseline
+from .network import Architecture, Network
+from .policy import Policy
+from .safetensors import from_bytes, to_bytes
+
 DESCRIPTION, WEIGHTS, FORMAT = "policy.json", "weights.safetensors", 1
 SHIPPED = configs() / "policies"
 COMPARED = ("group", "name", "start", "stop", "unit", "scale")
-"""Of a part of the observation, what has to be as in training."""
+"""What of each part of the observation has to be as in training."""
 
 
 class Description(Settings):
@@ -99,7 +102,7 @@ class LearnedPolicy(Policy):
         folder = Path(folder)
         try:
             file = DESCRIPTION
-            found = json.loads((folder / file).read_text(encoding="utf-8"))
+            facts = json.loads((folder / file).read_text(encoding="utf-8"))
             file = WEIGHTS
             content = (folder / file).read_bytes()
         except (OSError, UnicodeDecodeError) as error:
@@ -107,13 +110,12 @@ class LearnedPolicy(Policy):
             raise InputError(f"policy '{folder}' cannot be read: {file}: {reason}.") from None
         except ValueError as error:
             raise InputError(f"'{folder / DESCRIPTION}' is no JSON: {error}.") from None
-        if not isinstance(found, dict):
-            raise InputError(f"'{folder / DESCRIPTION}' holds a {type(found).__name__}; a mapping is wanted.")
+        if not isinstance(facts, dict):
+            raise InputError(f"'{folder / DESCRIPTION}' holds a {type(facts).__name__}: expected a mapping.")
         try:
-            found["architecture"] = Architecture(**found.get("architecture", {}))
-            description = Description(**found)
-            if description.environment != ENVIRONMENT_ID:
-                raise InputError(f"it was trained in {description.environment}; here there is {ENVIRONMENT_ID}.")
+            facts["architecture"] = Architecture(**facts.get("architecture", {}))
+            description = Description(**facts)
+            _check_registered(description.environment)
             if hashlib.sha256(content).hexdigest() != description.weights_sha256:
                 raise InputError(f"{WEIGHTS} is cut off or was changed: its SHA-256 is not that of {DESCRIPTION}.")
             return cls(description, from_bytes(content, folder / WEIGHTS), name or str(folder))
@@ -125,22 +127,22 @@ class LearnedPolicy(Policy):
         content = to_bytes(self.arrays)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / WEIGHTS).write_bytes(content)
-        found = self.description.model_dump(mode="json") | {"weights_sha256": hashlib.sha256(content).hexdigest()}
-        (folder / DESCRIPTION).write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+        facts = self.description.model_dump(mode="json") | {"weights_sha256": hashlib.sha256(content).hexdigest()}
+        (folder / DESCRIPTION).write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
 
     def reset(self, env: gymnasium.Env) -> None:
         """Forget the last patient; an environment that the policy does not know is refused."""
         facts, d = world_facts(env), self.description
         mine = [[part[k] for k in COMPARED] for part in d.structure]
         theirs = [[part[k] for k in COMPARED] for part in facts["structure"]]
-        for what, trained, found in (
+        for what, trained, here in (
             ("observation", mine, theirs),
             ("action mode", d.action_mode, facts["action_mode"]),
             ("control period", d.period, facts["period"]),
             ("drive", d.drive, facts["drive"]),
         ):
-            if trained != found:
-                raise InputError(f"policy '{self.name}' was trained with another {what}: {trained}, not {found}.")
+            if trained != here:
+                raise InputError(f"policy '{self.name}' was trained with another {what}: {trained}, not {here}.")
         self.network.reset()
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
@@ -148,31 +150,78 @@ class LearnedPolicy(Policy):
         return self.network(observation)
 
 
+def _check_registered(environment: str) -> None:
+    """What is observed and commanded is compared at each reset; here only whether the environment is known at all."""
+    try:
+        environment_id(environment)
+    except InputError as error:
+        raise InputError(f"it was trained in {environment}: {error}") from None
+
+
 def find_policy(name: str) -> Policy:
-    """A baseline or a shipped policy by name, or a trained one by its folder or the folder of its training.
+    """A policy by what a user calls it.
+
+    Args:
+        name: a baseline or a shipped policy; the folder of a trained one, or of its training; or "module:Class" for a
+            class of your own, see `Policy`.
 
     Raises:
-        InputError: there is neither.
+        InputError: there is none; says how a .zip of Stable-Baselines3 becomes one.
     """
     if name in POLICIES:
         return baseline(name)
     if name in shipped_policies():
         return LearnedPolicy.load(SHIPPED / name, name)
     folder = Path(name)
+    if folder.suffix == ".zip":
+        raise InputError(
+            f"policy '{name}': a .zip of Stable-Baselines3 carries pickles, which can run any code when they are read. "
+            f"If you trust who made it, export it first, and evaluate the folder: "
+            f"{PROGRAM} export {name} --trust --algorithm ppo --out {folder.with_suffix('')}_policy"
+        )
     if (folder / DESCRIPTION).is_file():
         return LearnedPolicy.load(folder, name)
     if (folder / "run.json").is_file():
-        from agents.training.checkpoint import Store
-
         return LearnedPolicy.load(Store(folder / "best").latest(), name)
+    if ":" in name:
+        return own_policy(name)
     if folder.is_dir():
         raise InputError(f"policy '{name}': there is no {DESCRIPTION} in this folder.")
     if folder.exists():
-        raise InputError(f"policy '{name}' is a file; the folder of a policy or of a training is wanted.")
+        raise InputError(f"policy '{name}' is a file: expected the folder of a policy or of a training.")
     if "/" in name:
         raise InputError(f"policy '{name}': there is no such folder.")
     known = [*POLICIES, *shipped_policies()]
-    raise InputError(f"unknown policy '{name}'. There are: {choices(known)}, and folders of trained policies.")
+    raise InputError(
+        f"unknown policy '{name}'. There are: {choices(known)}, folders of trained policies, and module:Class for your "
+        "own."
+    )
+
+
+def own_policy(name: str) -> Policy:
+    """A policy of a user's own class.
+
+    Args:
+        name: "module:Class"; the module is imported, and the class called without arguments.
+
+    Raises:
+        InputError: the module or the class is not there, or it is no `Policy`.
+    """
+    module, _, kind = name.partition(":")
+    try:
+        own = getattr(importlib.import_module(module), kind)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise InputError(f"policy '{name}': expected module:Class that Python can import, got: {error}.") from None
+    if not (isinstance(own, type) and issubclass(own, Policy)):
+        raise InputError(f"policy '{name}': expected a subclass of {Policy.__module__}.Policy, got {own!r}.")
+    missing = [what for what in ("title", "action_mode") if not hasattr(own, what)]
+    if missing or own.__abstractmethods__:
+        raise InputError(
+            f"policy '{name}': the class lacks {choices([*missing, *own.__abstractmethods__])}; see Policy."
+        )
+    one = own()
+    one.__dict__["name"] = name
+    return one
 
 
 def repetitions_of(policies: Sequence[Policy], given: int | None = None) -> int:

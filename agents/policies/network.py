@@ -21,7 +21,7 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "silu": lambda x: x * sigmoid(x),
     "leakyrelu": lambda x: np.where(x > 0.0, x, 0.01 * x),
 }
-"""Of PyTorch with its default arguments."""
+"""Activations as PyTorch computes them with its default arguments."""
 
 
 class Architecture(Settings):
@@ -45,18 +45,18 @@ class Architecture(Settings):
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shape of each array."""
-        found: dict[str, tuple[int, ...]] = {}
+        shapes: dict[str, tuple[int, ...]] = {}
         if self.normalised:
-            found |= {"mean": (self.inputs,), "variance": (self.inputs,)}
+            shapes |= {"mean": (self.inputs,), "variance": (self.inputs,)}
         width, gates = self.inputs, 4 * self.lstm_width
         for k in range(self.lstm_layers):
-            found |= {f"lstm.{k}.input": (gates, width), f"lstm.{k}.state": (gates, self.lstm_width)}
-            found |= {f"lstm.{k}.input_bias": (gates,), f"lstm.{k}.state_bias": (gates,)}
+            shapes |= {f"lstm.{k}.input": (gates, width), f"lstm.{k}.state": (gates, self.lstm_width)}
+            shapes |= {f"lstm.{k}.input_bias": (gates,), f"lstm.{k}.state_bias": (gates,)}
             width = self.lstm_width
         for k, size in enumerate((*self.hidden, self.outputs)):
-            found |= {f"layer.{k}.weight": (size, width), f"layer.{k}.bias": (size,)}
+            shapes |= {f"layer.{k}.weight": (size, width), f"layer.{k}.bias": (size,)}
             width = size
-        return found
+        return shapes
 
 
 class Network:
@@ -73,11 +73,11 @@ class Network:
     def __init__(self, shape: Architecture, arrays: Mapping[str, np.ndarray]) -> None:
         if shape.activation not in ACTIVATIONS:
             raise InputError(f"activation '{shape.activation}' is unknown; there are {', '.join(ACTIVATIONS)}.")
-        for name, wanted in shape.shapes().items():
+        for name, expected in shape.shapes().items():
             if name not in arrays:
                 raise InputError(f"the weights lack '{name}'.")
-            if arrays[name].shape != wanted:
-                raise InputError(f"weights '{name}' have shape {arrays[name].shape}; {wanted} is wanted.")
+            if arrays[name].shape != expected:
+                raise InputError(f"weights '{name}' have shape {arrays[name].shape}: expected {expected}.")
             if not np.isfinite(arrays[name]).all():
                 raise InputError(f"weights '{name}' are not finite.")
         self.shape = shape

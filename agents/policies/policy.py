@@ -8,20 +8,24 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
-from agents.policies.tuned import Range
+from .tuned import Range
 
 
 class Policy(ABC):
-    """What acts in exo/ElbowLift-v0."""
+    """What acts in an environment. One of your own is a subclass with `title`, `action_mode` and the two methods.
+
+    `python -m agents evaluate --policy module:Class` runs it; its constructor is called without arguments.
+    """
 
     name: ClassVar[str]
+    """In tables; of a policy of your own it is what stands behind --policy."""
     title: ClassVar[str]
     training: ClassVar[str | None] = None
     """What trainings that differ in nothing but the seed have in common; None: not trained, or not known."""
     action_mode: ClassVar[str]
-    """Of the environment it acts in."""
+    """Action mode of the environment that it acts in."""
     observation: ClassVar[tuple[str, ...]] = ("device",)
-    """Groups that it sees."""
+    """Groups of the observation that it sees."""
     ranges: ClassVar[dict[str, Range]] = {}
     """Where its numbers may lie, which `python -m agents tune-baselines` searches; arguments of its constructor."""
 

@@ -35,21 +35,26 @@ class Range:
 
 
 @cache
-def _found() -> dict[str, dict[str, float]]:
+def _tuned() -> dict[str, dict[str, float]]:
     return read_yaml(configs() / FILE)
 
 
 def numbers(policy: str, ranges: dict[str, Range], given: dict[str, float]) -> dict[str, float]:
     """All numbers of a policy: those given, and the tuned ones for the rest.
 
+    Args:
+        policy: its name.
+        ranges: where each number may lie.
+        given: numbers that replace the tuned ones.
+
     Raises:
         InputError: a number is unknown or outside its range.
     """
-    used = {**_found()[policy], **given}
+    used = {**_tuned()[policy], **given}
     if used.keys() != ranges.keys():
-        raise InputError(f"policy '{policy}': numbers {', '.join(used)}; wanted are {', '.join(ranges)}.")
+        raise InputError(f"policy '{policy}': its numbers are {', '.join(ranges)}, got {', '.join(used)}.")
     for name, value in used.items():
         if not ranges[name].low <= value <= ranges[name].high:
             r = ranges[name]
-            raise InputError(f"policy '{policy}': {name} = {value}; a number from {r.low:g} to {r.high:g} is wanted.")
+            raise InputError(f"policy '{policy}': {name} = {value}: expected a number from {r.low:g} to {r.high:g}.")
     return used

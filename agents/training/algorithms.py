@@ -23,9 +23,10 @@ from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
-from agents.training.config import OURS, Config
-from agents.training.critic import TwoViewPolicy, seen_places
 from dms_core.errors import InputError, choices
+
+from .config import OURS, Config
+from .critic import TwoViewPolicy, seen_places
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "tqc": TQC, "recurrent_ppo": RecurrentPPO}
 ACTIVATIONS: dict[str, type[nn.Module]] = {
@@ -81,10 +82,10 @@ def arguments(config: Config) -> dict[str, Any]:
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
     if squashed and start is None and "log_std_init" in given:
         raise InputError(f"{name}: policy_kwargs: log_std_init does nothing without training.start.")
-    found = {k: _scheduled(v) for k, v in config.arguments.items()}
+    made = {k: _scheduled(v) for k, v in config.arguments.items()}
     if given:
-        found["policy_kwargs"] = {k: activation(v) if k == "activation_fn" else v for k, v in given.items()}
-    return found
+        made["policy_kwargs"] = {k: activation(v) if k == "activation_fn" else v for k, v in given.items()}
+    return made
 
 
 def policies(name: str) -> list[str]:
@@ -107,7 +108,7 @@ def activation(name: str) -> type[nn.Module]:
     """
     key = str(name).rpartition(".")[2].lower().replace("_", "")
     if key not in ACTIVATIONS:
-        raise InputError(f"policy_kwargs: activation_fn = '{name}'; one of {choices(ACTIVATIONS)} is wanted.")
+        raise InputError(f"policy_kwargs: activation_fn = '{name}': expected one of {choices(ACTIVATIONS)}.")
     return ACTIVATIONS[key]
 
 
@@ -123,15 +124,15 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
         seen = seen_places(worlds, critic, len(config.training.traces))
         policy, given["policy_kwargs"] = TwoViewPolicy, given.get("policy_kwargs", {}) | {"seen": seen}
     try:
-        found = find(config.training.algorithm)(
+        made = find(config.training.algorithm)(
             policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
         )
     except (AssertionError, ValueError, TypeError, RuntimeError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
     if config.training.start is not None:
-        _begin_at(found.policy, torch.tensor(config.training.start))
-    return found
+        _begin_at(made.policy, torch.tensor(config.training.start))
+    return made
 
 
 def _begin_at(policy: Any, action: torch.Tensor) -> None:
@@ -155,12 +156,12 @@ def _begin_at(policy: Any, action: torch.Tensor) -> None:
 def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str] = ()) -> None:
     """Refuses unknown keys and wrong types; `others`: keys that may stand beside these."""
     if not isinstance(given, Mapping):
-        raise InputError(f"{who} = {given!r}; a mapping is wanted.")
+        raise InputError(f"{who} = {given!r}: expected a mapping.")
     for key, value in given.items():
         if key not in known:
             raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices([*known, *others])}.")
         if key != "activation_fn" and not fits(value, known[key]):
-            raise InputError(f"{who}: {key} = {value!r}; {_wanted(known[key])} is wanted.")
+            raise InputError(f"{who}: {key} = {value!r}: expected {_in_words(known[key])}.")
 
 
 def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
@@ -168,9 +169,9 @@ def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
     for key, value in given.items():
         number = float(value.removeprefix("lin_")) if isinstance(value, str) and SCHEDULE.fullmatch(value) else value
         if key in SHARES and not 0.0 <= number <= 1.0:
-            raise InputError(f"{who}: {key} = {value!r}; a number from 0 to 1 is wanted.")
+            raise InputError(f"{who}: {key} = {value!r}: expected a number from 0 to 1.")
         if key in POSITIVE and not 0.0 < number < math.inf:
-            raise InputError(f"{who}: {key} = {value!r}; a positive number is wanted.")
+            raise InputError(f"{who}: {key} = {value!r}: expected a positive number.")
 
 
 def fits(value: Any, hint: Any) -> bool:
@@ -193,16 +194,16 @@ def fits(value: Any, hint: Any) -> bool:
     return value is None if hint in (None, type(None)) else hint is Any or isinstance(value, hint)
 
 
-def _wanted(hint: Any) -> str:
+def _in_words(hint: Any) -> str:
     """A type in words."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(_wanted(one) for one in inner))
+        return " or ".join(dict.fromkeys(_in_words(one) for one in inner))
     plain = {float: "a number", int: "a whole number", bool: "true or false", str: "text", type(None): "null"}
     if hint in plain:
         return plain[hint]
     if origin in (list, tuple):
-        return f"a list of {' and '.join(dict.fromkeys(_wanted(one) for one in inner))}"
+        return f"a list of {' and '.join(dict.fromkeys(_in_words(one) for one in inner))}"
     return "a mapping" if origin is dict else "text like lin_3e-4"
 
 

@@ -3,6 +3,9 @@
 A file has a section named after the environment, with the algorithm's arguments by the names of Stable-Baselines3 and
 beside them n_envs, n_timesteps, policy, normalize, frame_stack and env_kwargs. A second section, `training`, which
 rl_zoo3 does not look at, says what it takes from its command line: how often to evaluate and to save.
+
+rl_zoo3 gives env_kwargs to the environments that it trains in, and none to those that it evaluates in. A section that
+it is to read therefore has them once more, as arguments of the wrapper SAME_SETTINGS, which it puts around both.
 """
 
 from __future__ import annotations
@@ -12,24 +15,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-import gymnasium
 from pydantic import Field
 
-from agents.evaluation.evaluate import ENVIRONMENT
-from agents.training.rl_zoo_text import plain, read_call, write_call
 from dms_core.errors import InputError, choices
-from dms_core.yaml_text import read_value, read_yaml
+from dms_core.yaml_text import read_yaml
 from exo_env.settings import Settings
 
-ENVIRONMENT_ID = ENVIRONMENT.partition(":")[2]
-TRAINING = "training"
-MAPPINGS = ("policy_kwargs", "env_kwargs", "normalize")
-"""Keys whose mapping may stand as text."""
+from .config_file import SAME_SETTINGS, TRAINING, check_wrapper, chosen, override_value, sections
+from .rl_zoo_text import plain, write_call
+
 ALIASES = {"ppo_lstm": "recurrent_ppo"}
 """rl_zoo3's name of an algorithm to that of Stable-Baselines3."""
 
 Component = Annotated[float, Field(ge=-1.0, le=1.0)]
-"""Of an action."""
+"""One component of an action."""
 
 
 class Training(Settings):
@@ -42,19 +41,19 @@ class Training(Settings):
     save_every: int = Field(default=50_000, ge=1, description="steps between two checkpoints")
     threads: int = Field(default=1, ge=1, le=256, description="of PyTorch; small networks gain nothing from more")
     traces: tuple[float, ...] = Field(
-        default=(), max_length=8, description="time constants of filtered observations beside each one [s], traces.py"
+        default=(),
+        max_length=8,
+        description="time constants of filtered observations beside each one [s]",
     )
-    hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held, see hold.py")
-    start: tuple[Component, Component] | None = Field(
-        default=None, description="action of the untrained policy, from which it learns to differ; None: 0 and 0"
+    hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held")
+    start: tuple[Component, ...] | None = Field(
+        default=None, description="action of the untrained policy, from which it learns to differ; None: all 0"
     )
-    against: tuple[Component, Component] | None = Field(
+    against: tuple[Component, ...] | None = Field(
         default=None,
-        description="action whose reward on the same patient is taken off that of training, see paired.py; None: none",
+        description="action whose reward on the same patient is taken off that of training; None: none",
     )
-    critic: tuple[str, ...] = Field(
-        default=(), description="groups of the observation that only PPO's critic sees, see critic.py"
-    )
+    critic: tuple[str, ...] = Field(default=(), description="groups of the observation that only PPO's critic sees")
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?|mps|auto)$", description="of PyTorch")
 
 
@@ -63,6 +62,8 @@ class Config:
     """What to train, and how."""
 
     training: Training
+    environment: str
+    """Id of the environment, which is the name of its section."""
     n_envs: int
     n_timesteps: int
     policy: str
@@ -72,43 +73,50 @@ class Config:
     frame_stack: int
     """Observations that the policy sees at once."""
     arguments: dict[str, Any]
-    """Of the algorithm, not yet checked: algorithms.py knows them."""
+    """Arguments of the algorithm, not yet checked: algorithms.py knows them."""
     section: dict[str, Any]
     """The environment's section as given, overrides included."""
 
     @classmethod
-    def read(cls, path: str | Path, overrides: Sequence[str] = ()) -> Self:
+    def read(cls, path: str | Path, overrides: Sequence[str] = (), environment: str | None = None) -> Self:
         """A configuration file, some values replaced.
 
         Args:
             path: the algorithm is named after it unless its `training` section says otherwise.
             overrides: `key=value` or `key.key=value`, the value in YAML; keys of the environment's section, or of
                 `training` as `training.key`.
+            environment: id of the section to take, where a file has several; the default one, or the only one of an
+                environment that is registered, where it is not given.
 
         Raises:
             InputError: names file, key and value.
         """
         path = Path(path)
         try:
-            return cls.of(read_yaml(path), path.stem, overrides)
+            return cls.of(read_yaml(path), path.stem, overrides, environment)
         except InputError as error:
             said = str(error)
             raise InputError(said if str(path) in said else f"{path}: {said}") from None
 
     @classmethod
-    def of(cls, content: Mapping[str, Any], name: str, overrides: Sequence[str] = ()) -> Self:
+    def of(
+        cls, content: Mapping[str, Any], name: str, overrides: Sequence[str] = (), environment: str | None = None
+    ) -> Self:
         """A configuration from a file's content; `name` is the algorithm where the content does not say."""
-        section, training = _sections(content)
+        key, used = chosen(content, environment)
+        section, training = sections(content, key)
+        check_wrapper(section)
         for override in overrides:
-            _override(section, training, override)
+            override_value(section, training, override)
         training.setdefault("algorithm", name)
         training["algorithm"] = ALIASES.get(training["algorithm"], training["algorithm"])
         rest = {k: v for k, v in section.items() if k not in OURS}
         policy = section.get("policy", "MlpPolicy")
         if not isinstance(policy, str):
-            raise InputError(f"policy = {policy!r}; the name of a policy is wanted.")
+            raise InputError(f"policy = {policy!r}: expected the name of a policy.")
         return cls(
             training=Training(**training),
+            environment=used,
             n_envs=_whole("n_envs", section.get("n_envs", 1)),
             n_timesteps=_whole("n_timesteps", _needed(section, "n_timesteps")),
             policy=policy,
@@ -122,53 +130,14 @@ class Config:
     def content(self) -> dict[str, Any]:
         """What a file of this configuration holds; rl_zoo3 reads it too."""
         section = {k: write_call(v) if k == "policy_kwargs" else plain(v) for k, v in self.section.items()}
-        return {ENVIRONMENT_ID: section, TRAINING: self.training.model_dump()}
+        if self.env_kwargs:
+            section["env_wrapper"] = {SAME_SETTINGS: plain(self.env_kwargs)}
+        return {self.environment: section, TRAINING: self.training.model_dump()}
 
 
 OURS = ("n_envs", "n_timesteps", "policy", "normalize", "frame_stack", "env_kwargs")
 NORMALISATION = {"norm_obs": bool, "norm_reward": bool, "clip_obs": float, "clip_reward": float, "epsilon": float}
 """Arguments of VecNormalize that may be given, with their types; gamma is the algorithm's."""
-
-
-def _sections(content: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The environment's section and ours."""
-    if ENVIRONMENT_ID not in content:
-        others = [k for k in content if k != TRAINING]
-        registered = [k for k in gymnasium.registry if k.startswith("exo/")] or [ENVIRONMENT_ID]
-        raise InputError(
-            f"the configuration is for {choices(others) if others else 'no environment'}; "
-            f"here there is {choices(registered)}."
-        )
-    section, training = content[ENVIRONMENT_ID], content.get(TRAINING, {})
-    for name, value in ((ENVIRONMENT_ID, section), (TRAINING, training)):
-        if not isinstance(value, Mapping):
-            raise InputError(f"section '{name}' holds {value!r}; a mapping of keys to values is wanted.")
-    found = dict(section)
-    for key in MAPPINGS:
-        if isinstance(found.get(key), str):
-            try:
-                found[key] = read_call(found[key])
-            except InputError as error:
-                raise InputError(f"{key}: {error}") from None
-    return found, dict(training)
-
-
-def _override(section: dict[str, Any], training: dict[str, Any], text: str) -> None:
-    """Replace one value."""
-    key, equals, value = text.partition("=")
-    path = key.strip().split(".")
-    if not equals or not all(path):
-        raise InputError(f"--set {text}: key=value is wanted, for example n_timesteps=1000.")
-    place: Any = section
-    if path[0] == TRAINING and len(path) > 1:
-        place, path = training, path[1:]
-    for part in path[:-1]:
-        place[part] = dict(place.get(part) or {}) if isinstance(place.get(part), Mapping | None) else None
-        place = place[part]
-        if place is None:
-            raise InputError(f"--set {text}: '{part}' is not a mapping.")
-    found = read_value(value)
-    place[path[-1]] = read_call(found) if path[-1] in MAPPINGS and isinstance(found, str) else found
 
 
 def _needed(section: Mapping[str, Any], key: str) -> Any:
@@ -180,13 +149,13 @@ def _needed(section: Mapping[str, Any], key: str) -> Any:
 def _whole(key: str, value: Any) -> int:
     """A whole number from 1; 1e6 is one."""
     if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value) or value < 1:
-        raise InputError(f"{key} = {value!r}; a whole number from 1 is wanted.")
+        raise InputError(f"{key} = {value!r}: expected a whole number from 1.")
     return int(value)
 
 
 def _mapping(key: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise InputError(f"{key} = {value!r}; a mapping is wanted.")
+        raise InputError(f"{key} = {value!r}: expected a mapping.")
     return dict(value)
 
 
@@ -203,7 +172,7 @@ def _normalisation(value: Any, section: Mapping[str, Any]) -> dict[str, Any] | N
             raise InputError(f"normalize: unknown key '{key}'. Allowed: {choices(NORMALISATION)}.")
         kinds = (bool,) if NORMALISATION[key] is bool else (int, float)
         if not isinstance(one, kinds) or (bool not in kinds and (isinstance(one, bool) or one <= 0)):
-            wanted = "true or false" if bool in kinds else "a positive number"
-            raise InputError(f"normalize: {key} = {one!r}; {wanted} is wanted.")
+            right = "true or false" if bool in kinds else "a positive number"
+            raise InputError(f"normalize: {key} = {one!r}: expected {right}.")
     gamma = section.get("gamma")
     return given | ({"gamma": gamma} if isinstance(gamma, float) else {})

@@ -42,11 +42,11 @@ class TwoViews(nn.Module):
         return self.forward_actor(features), self.forward_critic(features)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Of what the actor sees."""
+        """Latent values of the actor, from what it sees."""
         return self.policy_net(features[:, self.seen])
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """Of everything."""
+        """Latent values of the critic, from everything."""
         return self.value_net(features)
 
 
@@ -82,7 +82,7 @@ def actor_size(worlds: VecEnv, critic: Sequence[str]) -> int:
 
 
 def seen_places(worlds: VecEnv, critic: Sequence[str], filters: int) -> list[int]:
-    """Places of what the actor sees; behind what everybody sees stand its filtered observations (traces.py)."""
+    """Places of what the actor sees; behind what everybody sees stand its filtered observations."""
     single: Any = worlds.observation_space
     actor = actor_size(worlds, critic)
     return [*range(actor), *range(single.shape[0] - filters * actor, single.shape[0])]

@@ -24,7 +24,7 @@ from dms_core.errors import InputError
 
 MODEL, STATISTICS, REPLAY, RANDOM = "model.zip", "statistics.npz", "replay.npz", "random.npz"
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-"""Of a replay buffer."""
+"""Arrays of a replay buffer."""
 
 
 def save_state(model: BaseAlgorithm, folder: Path) -> None:
@@ -46,10 +46,10 @@ def save_model(model: BaseAlgorithm, folder: Path) -> None:
     model.save(content)
     (folder / MODEL).write_bytes(content.getvalue())
     if (statistics := model.get_vec_normalize_env()) is not None:
-        found: dict[str, Any] = {}
+        arrays: dict[str, Any] = {}
         for name, one in _running(statistics).items():
-            found |= {f"{name}_mean": one.mean, f"{name}_var": one.var, f"{name}_count": one.count}
-        _write(folder / STATISTICS, **found)
+            arrays |= {f"{name}_mean": one.mean, f"{name}_var": one.var, f"{name}_count": one.count}
+        _write(folder / STATISTICS, **arrays)
 
 
 def load_state(model: BaseAlgorithm, folder: Path) -> None:
@@ -64,11 +64,11 @@ def load_state(model: BaseAlgorithm, folder: Path) -> None:
             _load_statistics(statistics, folder / STATISTICS)
         if isinstance(model, OffPolicyAlgorithm):
             _load_replay(model, folder / REPLAY)
-        found = _read(folder / RANDOM)
-        torch.set_rng_state(torch.from_numpy(found["torch"]))
-        position, has_gauss, gauss = found["numpy_rest"]
-        np.random.set_state(("MT19937", found["numpy"], int(position), int(has_gauss), float(gauss)))
-        random.setstate((3, tuple(int(x) for x in found["python"]), None))
+        arrays = _read(folder / RANDOM)
+        torch.set_rng_state(torch.from_numpy(arrays["torch"]))
+        position, has_gauss, gauss = arrays["numpy_rest"]
+        np.random.set_state(("MT19937", arrays["numpy"], int(position), int(has_gauss), float(gauss)))
+        random.setstate((3, tuple(int(x) for x in arrays["python"]), None))
     except OSError as error:
         raise InputError(f"'{error.filename}' cannot be read: {error.strerror}.") from None
 
@@ -92,10 +92,10 @@ def _running(statistics: VecNormalize) -> dict[str, Any]:
 
 def _load_statistics(statistics: VecNormalize, path: Path) -> None:
     """Means and variances."""
-    found = _read(path)
+    arrays = _read(path)
     for name, one in _running(statistics).items():
-        mean, var = _of_shape(path, found, f"{name}_mean", one.mean), _of_shape(path, found, f"{name}_var", one.var)
-        one.mean, one.var, one.count = mean, var, float(found[f"{name}_count"])
+        mean, var = _of_shape(path, arrays, f"{name}_mean", one.mean), _of_shape(path, arrays, f"{name}_var", one.var)
+        one.mean, one.var, one.count = mean, var, float(arrays[f"{name}_count"])
 
 
 def _save_replay(model: OffPolicyAlgorithm, path: Path) -> None:
@@ -108,14 +108,14 @@ def _save_replay(model: OffPolicyAlgorithm, path: Path) -> None:
 
 def _load_replay(model: OffPolicyAlgorithm, path: Path) -> None:
     """Into an empty buffer of the same size."""
-    buffer, found = model.replay_buffer, _read(path)
+    buffer, arrays = model.replay_buffer, _read(path)
     assert buffer is not None
     for name in COLUMNS:
-        column, place = found.get(name), getattr(buffer, name)
+        column, place = arrays.get(name), getattr(buffer, name)
         if column is None or column.shape[1:] != place.shape[1:] or len(column) > len(place):
             raise InputError(f"'{path}' does not hold the replay buffer of this configuration: {name} does not fit.")
         place[: len(column)] = column
-    buffer.pos, buffer.full = int(found["place"][0]), bool(found["place"][1])
+    buffer.pos, buffer.full = int(arrays["place"][0]), bool(arrays["place"][1])
 
 
 def _write(path: Path, **arrays: Any) -> None:
@@ -125,14 +125,14 @@ def _write(path: Path, **arrays: Any) -> None:
 def _read(path: Path) -> Mapping[str, np.ndarray]:
     """Arrays of a file; pickles are refused."""
     try:
-        with np.load(path, allow_pickle=False) as found:
-            return dict(found)
+        with np.load(path, allow_pickle=False) as arrays:
+            return dict(arrays)
     except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
         raise InputError(f"'{path}' is cut off or no NumPy archive: {error}.") from None
 
 
-def _of_shape(path: Path, found: Mapping[str, np.ndarray], name: str, like: Any) -> np.ndarray:
+def _of_shape(path: Path, arrays: Mapping[str, np.ndarray], name: str, like: Any) -> np.ndarray:
     """An array that has to have the shape of another."""
-    if name not in found or found[name].shape != np.shape(like):
+    if name not in arrays or arrays[name].shape != np.shape(like):
         raise InputError(f"'{path}' does not hold the statistics of this configuration: {name} does not fit.")
-    return found[name]
+    return arrays[name]

@@ -28,14 +28,14 @@ def read_call(text: str) -> dict[str, Any]:
         InputError: the text is something else; names the part.
     """
     try:
-        found = _value(ast.parse(text.strip(), mode="eval").body)
+        mapping = _value(ast.parse(text.strip(), mode="eval").body)
     except (SyntaxError, ValueError) as error:
         raise InputError(
-            f"{text!r} is not a mapping: {error}; dict(key=value, ...) with plain values is wanted."
+            f"{text!r} is not a mapping ({error}): expected dict(key=value, ...) with plain values."
         ) from None
-    if not isinstance(found, dict):
-        raise InputError(f"{text!r} is a {type(found).__name__}; dict(key=value, ...) with plain values is wanted.")
-    return found
+    if not isinstance(mapping, dict):
+        raise InputError(f"{text!r} is a {type(mapping).__name__}: expected dict(key=value, ...) with plain values.")
+    return mapping
 
 
 def write_call(values: Mapping[str, Any]) -> str:
@@ -51,8 +51,8 @@ def _value(node: ast.expr) -> Any:
     if isinstance(node, ast.Name | ast.Attribute):
         return Name(_dotted(node))
     if isinstance(node, ast.List | ast.Tuple):
-        found = [_value(e) for e in node.elts]
-        return found if isinstance(node, ast.List) else tuple(found)
+        items = [_value(e) for e in node.elts]
+        return items if isinstance(node, ast.List) else tuple(items)
     if isinstance(node, ast.Dict):
         return {_key(k): _value(v) for k, v in zip(node.keys, node.values, strict=True)}
     return ast.literal_eval(node)

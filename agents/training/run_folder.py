@@ -22,11 +22,13 @@ from typing import Any
 
 import yaml
 
-from agents.provenance import revision, versions
-from agents.training.checkpoint import Store
-from agents.training.config import ENVIRONMENT_ID, Config
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, whole_file, write_json
+
+from ..checkpoint import Store
+from ..environment import environment_id
+from ..provenance import revision, versions
+from .config import Config
 
 RECORD, CONFIG, EVALUATIONS, LOCK = "run.json", "config.yml", "evaluations.json", ".lock"
 
@@ -49,7 +51,7 @@ class RunFolder:
             InputError: the folder is in use, or is a file.
         """
         if self.path.exists() and not self.path.is_dir():
-            raise InputError(f"output '{self.path}' is a file; a new or empty folder is wanted.")
+            raise InputError(f"output '{self.path}' is a file: expected a new or empty folder.")
         # A start that was killed before its record was written leaves no more than these.
         if self.path.is_dir() and {p.name for p in self.path.iterdir()} - {CONFIG, LOCK}:
             hint = f"go on with --resume {self.path}, or" if (self.path / RECORD).is_file() else ""
@@ -57,7 +59,7 @@ class RunFolder:
         check_writable(self.path / RECORD)
         self.write_config(config)
         record = {
-            "environment": ENVIRONMENT_ID, "algorithm": config.training.algorithm, "seed": seed,
+            "environment": config.environment, "algorithm": config.training.algorithm, "seed": seed,
             "sessions": [_session()],
         }  # fmt: skip
         write_json(self.path / RECORD, record)
@@ -69,9 +71,8 @@ class RunFolder:
             InputError: the folder holds no training, or one of another environment.
         """
         record = read_record(self.path)
-        if record.get("environment") != ENVIRONMENT_ID:
-            raise InputError(f"'{self.path}' is of {record.get('environment')}; here there is {ENVIRONMENT_ID}.")
-        config = Config.read(self.path / CONFIG, overrides)
+        environment = environment_id(str(record["environment"]))
+        config = Config.read(self.path / CONFIG, overrides, environment)
         if overrides:
             self.write_config(config)
         record["sessions"].append(_session())

@@ -1,18 +1,29 @@
-"""The environments in which agents learn: the one place where they are made."""
+"""The worlds in which a policy learns."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from stable_baselines3.common.vec_env import VecEnv, VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecMonitor, VecNormalize
 
-from agents.training.wrappers.paired_rewards import Paired
-from exo_env.envs.stable_baselines import ElbowLiftVecEnv
+from dms_core.errors import InputError
+
+from ..environment import ENVIRONMENT, make_sb3_worlds, spec_of
+from .algorithms import arguments
+from .config import Config
+from .critic import actor_size
+from .wrappers.action_repeat import ActionRepeat
+from .wrappers.low_pass import LowPassObservations, kept_shares
+from .wrappers.paired_rewards import PairedRewards
 
 
 def training_worlds(
-    settings: Mapping[str, Any], n_envs: int, seed: int, against: Sequence[float] | None = None
+    settings: Mapping[str, Any],
+    n_envs: int,
+    seed: int,
+    against: Sequence[float] | None = None,
+    environment: str = ENVIRONMENT,
 ) -> VecEnv:
     """Worlds of one compiled batch, seeded; they reset themselves, and `infos` hold an "episode" at each end.
 
@@ -20,15 +31,41 @@ def training_worlds(
         settings: of the environment.
         n_envs: how many.
         seed: world k has seed + k.
-        against: action whose reward on the same patient is taken off, see paired.py.
+        against: action whose reward on the same patient is taken off, see wrappers/paired_rewards.py.
+        environment: its id.
 
     Raises:
         InputError: a setting is not usable.
     """
     worlds: VecEnv
     if against is None:
-        worlds = ElbowLiftVecEnv(n_envs, **settings)
+        worlds = make_sb3_worlds(environment, n_envs, **settings)
     else:
-        worlds = Paired(ElbowLiftVecEnv(2 * n_envs, **settings), against)
+        worlds = PairedRewards(make_sb3_worlds(environment, 2 * n_envs, **settings), against)
     worlds.seed(seed)
     return VecMonitor(worlds)
+
+
+def wrapped(config: Config, seed: int) -> VecEnv:
+    """Training worlds of a configuration, observations stacked and then normalised if it says so.
+
+    rl_zoo3 normalises first; then algorithms with a replay buffer could not have both.
+    """
+    arguments(config)
+    registered = spec_of(config.environment).kwargs.get("observation", ("device",))
+    own, more = list(config.env_kwargs.get("observation", registered)), config.training.critic
+    settings, against = config.env_kwargs | {"observation": [*own, *more]}, config.training.against
+    worlds = training_worlds(settings, config.n_envs, seed, against, config.environment)
+    single: Any = worlds.action_space
+    for name, action in (("start", config.training.start), ("against", against)):
+        if action is not None and len(action) != single.shape[0]:
+            raise InputError(f"training.{name} = {list(action)}: expected {single.shape[0]} numbers, one an action.")
+    period = config.training.hold * worlds.get_attr("period", 0)[0]
+    if config.training.hold > 1:
+        worlds = ActionRepeat(worlds, config.training.hold)
+    if config.frame_stack > 1:
+        worlds = VecFrameStack(worlds, config.frame_stack)
+    if config.training.traces:
+        kept = kept_shares(config.training.traces, period)
+        worlds = LowPassObservations(worlds, kept, config.frame_stack * actor_size(worlds, more))
+    return worlds if config.normalize is None else VecNormalize(worlds, **config.normalize)

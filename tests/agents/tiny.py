@@ -4,6 +4,8 @@ from pathlib import Path
 
 import yaml
 
+from agents.environment import ENVIRONMENT
+
 ENV_KWARGS = {"patient": "stroke_mild", "episode_duration": 0.4}
 TRAINING = {"eval_every": 64, "eval_patients": 1, "save_every": 32}
 ON_POLICY = {"n_envs": 2, "n_timesteps": 128, "n_steps": 16, "batch_size": 32, "n_epochs": 2, "gamma": 0.98}
@@ -25,7 +27,7 @@ SECTIONS = {
 def content(algorithm="ppo", training=None, **changes):
     """Content of a configuration file."""
     section = {**SECTIONS[algorithm], "env_kwargs": dict(ENV_KWARGS), **changes}
-    return {"exo/ElbowLift-v1": section, "training": {"algorithm": algorithm, **TRAINING, **(training or {})}}
+    return {ENVIRONMENT: section, "training": {"algorithm": algorithm, **TRAINING, **(training or {})}}
 
 
 def config_file(folder: Path, algorithm="ppo", training=None, **changes) -> Path:

@@ -12,8 +12,10 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from dms_core.renamed import replaced
 
-class Held(VecEnvWrapper):
+
+class ActionRepeat(VecEnvWrapper):
     """Worlds that take an action for several control periods; their rewards are summed.
 
     A world whose episode ends on the way goes on with the same action in its next one, whose rewards until the next
@@ -30,9 +32,9 @@ class Held(VecEnvWrapper):
 
     def reset(self) -> np.ndarray:
         """First observations."""
-        seen = self.venv.reset()
-        assert isinstance(seen, np.ndarray)
-        return seen
+        observations = self.venv.reset()
+        assert isinstance(observations, np.ndarray)
+        return observations
 
     def step_async(self, actions: np.ndarray) -> None:
         """Remember the actions."""
@@ -41,12 +43,15 @@ class Held(VecEnvWrapper):
     def step_wait(self) -> VecEnvStepReturn:
         """All control periods of an action."""
         total, over = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, bool)
-        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        last: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for _ in range(self._periods):
             self.venv.step_async(self._actions)
-            seen, rewards, ended, infos = self.venv.step_wait()
+            observations, rewards, ended, infos = self.venv.step_wait()
             total += np.where(over, 0.0, rewards)
             for i in np.flatnonzero(ended & ~over):
-                told[i] = infos[i]
+                last[i] = infos[i]
             over |= ended
-        return seen, total, over, told
+        return observations, total, over, last
+
+
+__getattr__ = replaced(__name__, {"Held": "It is now ActionRepeat."})

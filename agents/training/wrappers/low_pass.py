@@ -16,13 +16,15 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from dms_core.renamed import replaced
+
 
 def kept_shares(times: Sequence[float], period: float) -> tuple[float, ...]:
     """Share of a filtered observation that a control period [s] keeps, for each time constant [s]."""
     return tuple(float(x) for x in np.exp(-period / np.asarray(times, float)))
 
 
-class Traces(VecEnvWrapper):
+class LowPassObservations(VecEnvWrapper):
     """Worlds whose observations are followed by their filtered ones, shape (num_envs, n + len(kept) size).
 
     Args:
@@ -61,3 +63,6 @@ class Traces(VecEnvWrapper):
 
     def _joined(self, seen: np.ndarray, memory: np.ndarray) -> np.ndarray:
         return np.concatenate([seen, memory.reshape(len(seen), -1)], axis=1).astype(np.float32)
+
+
+__getattr__ = replaced(__name__, {"Traces": "It is now LowPassObservations."})

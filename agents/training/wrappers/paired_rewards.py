@@ -17,23 +17,25 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from dms_core.errors import InputError
-from exo_env.envs.stable_baselines import ElbowLiftVecEnv
+from dms_core.renamed import replaced
 
 
-class Paired(VecEnvWrapper):
+class PairedRewards(VecEnvWrapper):
     """The first half of some worlds; each has its twin in the second half.
 
     An episode that an event ends takes its twin's with it. Where a twin's ends first, its rewards count as 0 from then
     on.
 
     Args:
-        worlds: an even number.
-        action: of the twins, shape (2,).
+        worlds: an even number, as `make_sb3_worlds` makes them.
+        action: of the twins, shape (n,).
     """
 
-    def __init__(self, worlds: ElbowLiftVecEnv, action: Sequence[float]) -> None:
+    def __init__(self, worlds: Any, action: Sequence[float]) -> None:
         if worlds.num_envs % 2:
-            raise InputError(f"{worlds.num_envs} worlds cannot be paired; an even number is wanted.")
+            raise InputError(f"{worlds.num_envs} worlds cannot be paired: expected an even number.")
+        if len(action) != worlds.action_space.shape[0]:
+            raise InputError(f"action of the twins = {list(action)}: expected {worlds.action_space.shape[0]} numbers.")
         super().__init__(worlds)
         self._batch = worlds.worlds
         self.num_envs = worlds.num_envs // 2
@@ -43,10 +45,10 @@ class Paired(VecEnvWrapper):
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """World k and its twin begin with seed + k at the next reset."""
-        n, found = self.num_envs, list(self.venv.seed(seed))
-        self._generator = np.random.default_rng([found[0] or 0, 1])
+        n, seeds = self.num_envs, list(self.venv.seed(seed))
+        self._generator = np.random.default_rng([seeds[0] or 0, 1])
         self.venv._seeds[n:] = self.venv._seeds[:n]
-        return found[:n]
+        return seeds[:n]
 
     def reset(self) -> np.ndarray:
         """First observations."""
@@ -68,10 +70,10 @@ class Paired(VecEnvWrapper):
         seen, rewards, over, infos = self.venv.step_wait()
         assert isinstance(seen, np.ndarray)
         ended, twin_ended = over[:n], over[n:]
-        found = rewards[:n] - np.where(self._alone, 0.0, rewards[n:])
+        gained = rewards[:n] - np.where(self._alone, 0.0, rewards[n:])
         self._alone |= twin_ended & ~ended
         apart = ended & (self._alone | ~twin_ended)
-        return self._together(apart, seen[:n]), found.astype(np.float32), ended, infos[:n]
+        return self._together(apart, seen[:n]), gained.astype(np.float32), ended, infos[:n]
 
     def get_attr(self, attr_name: str, indices: None | int | Iterable[int] = None) -> list[Any]:
         """An attribute of worlds, never of twins."""
@@ -101,3 +103,6 @@ class Paired(VecEnvWrapper):
         first, _ = self._batch.reset(seed=seeds.tolist(), options={"reset_mask": np.tile(apart, 2)})
         self._alone[apart] = False
         return np.where(apart[:, None], first[:n], seen)
+
+
+__getattr__ = replaced(__name__, {"Paired": "It is now PairedRewards."})

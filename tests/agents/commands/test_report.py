@@ -9,11 +9,13 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from agents.__main__ import main
-from agents.commands.report import _again, collected, grouped, pooled
+from agents.commands.report import _again
+from agents.commands.report_input import collected, grouped
 from agents.evaluation.evaluate import by_patient, evaluate
+from agents.evaluation.pooling import pooled
 from agents.evaluation.report_figures import on_common_steps
 from agents.evaluation.statistics import interquartile_mean
-from agents.evaluation.time_course import course
+from agents.evaluation.time_course import time_course
 from agents.policies.baselines import policy
 from tests.agents.tiny import config_file
 
@@ -67,7 +69,7 @@ def test_a_course_has_the_load_that_was_lifted():
 
 
 def test_same_seed_is_the_same_patient_for_all_policies():
-    one, other = (course(policy(n), "stroke_severe", 3) for n in ("pid", "none"))
+    one, other = (time_course(policy(n), "stroke_severe", 3) for n in ("pid", "none"))
     assert one.patient == other.patient and one.load == other.load and one.columns["time"][-1] == pytest.approx(6.0)
 
 
@@ -126,8 +128,8 @@ def test_evaluations_with_other_loads_stay_apart(evaluated, tmp_path):
     [
         ("is neither the folder of a training nor an evaluation", ["nowhere"]),
         ("cannot be read", ["{folder}/evaluation.json"]),
-        ("folders of trainings or evaluation.json files are wanted", []),
-        ("two different names", ["{evaluated}", "--policies", "pid"]),
+        ("expected folders of trainings or evaluation.json files", []),
+        ("expected two different names", ["{evaluated}", "--policies", "pid"]),
         ("unknown population", ["{evaluated}", "--mild", "martians"]),
     ],
 )

@@ -65,8 +65,8 @@ def test_band_tells_what_ended_an_episode():
 @pytest.mark.parametrize(
     "said, name, policies",
     [
-        ("a name that ends in .mp4 or .gif", "a.avi", ["pid"]),
-        ("one to 4 different names", "a.gif", ["pid", "pid"]),
+        ("expected a name that ends in .mp4 or .gif", "a.avi", ["pid"]),
+        ("expected one to 4 different names", "a.gif", ["pid", "pid"]),
         ("unknown policy 'nobody'", "a.gif", ["nobody"]),
     ],
 )

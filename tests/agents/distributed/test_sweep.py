@@ -34,7 +34,7 @@ def square_or_die(number, folder):
 
 
 def complain(number):
-    raise InputError("number = 1; 2 is wanted.")
+    raise InputError("number = 1: expected 2.")
 
 
 def test_a_lost_share_is_done_again(tmp_path):
@@ -45,7 +45,7 @@ def test_a_lost_share_is_done_again(tmp_path):
 
 
 def test_mistakes_come_back_as_one_sentence():
-    with pytest.raises(DmsError, match=r"^number = 1; 2 is wanted\.$"):
+    with pytest.raises(DmsError, match=r"^number = 1: expected 2\.$"):
         share_out(complain, [(1,)], cpus=1)
 
 

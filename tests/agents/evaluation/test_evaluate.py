@@ -2,12 +2,14 @@
 
 import json
 import math
+import sys
 
 import numpy as np
 import pytest
 
 from agents.__main__ import main
-from agents.evaluation.evaluate import by_patient, evaluate, patient_seeds
+from agents.environment import patient_seeds
+from agents.evaluation.evaluate import by_patient, evaluate
 from agents.evaluation.measures import MEASURES
 from agents.evaluation.statistics import interquartile_mean
 from agents.evaluation.tables import short_table, whole_table
@@ -115,7 +117,7 @@ def test_more_patients_keep_the_first():
 
 def test_shares_of_work_sum_to_one_and_measures_are_complete():
     for p in run(list(POLICIES))["policies"].values():
-        assert list(p["summary"]) == [m.name for m in MEASURES]
+        assert [n for n in p["summary"] if not n.startswith("reward.")] == [m.name for m in MEASURES]
         for e in p["episodes"]:
             m = e["measures"]
             shares = m["device_work_share"], m["patient_work_share"]
@@ -152,6 +154,15 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 1
     assert (tmp_path / "evaluation.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.md", "evaluation.png"]
+
+
+def test_without_matplotlib_the_figure_is_left_out(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "evaluation.png").touch()
+    assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path / "out")]) == 0
+    assert "evaluation.png is left out: " in capsys.readouterr().out
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["evaluation.json", "evaluation.md"]
 
 
 def test_command_takes_repetitions(tmp_path, capsys):

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from agents.environment import ENVIRONMENT, make
 from agents.evaluation.recruitment import most_added, most_recruited, powers, recruited
-from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.patient.patient import Patient
 from exo_env.patient.slacking import advance_effort
-from exo_env.world.control_period import READING
 
 PERIOD = 0.02
 PATIENT = Patient(slacking_rate=0.4, effort_recovery=1.5, least_effort=0.2, effort_at_start=0.7, feedback_gain=0.3)
@@ -51,7 +50,7 @@ def test_the_best_error_reaches_the_most_and_no_other_comes_above():
 
 def test_powers_are_those_of_the_lift():
     """The planned one is what lifts the weight expected and the arm: their potential energy, on a slow move."""
-    env = ElbowLiftEnv(action_mode="pid_setpoint", patient="healthy")
+    env = make(ENVIRONMENT, action_mode="pid_setpoint", patient="healthy").unwrapped
     for expected in (1.0, 0.5):
         patient = {**PATIENT.model_dump(), "expected_load": expected}
         env.reset(seed=1, options={"patient": patient, "load": 2.0})
@@ -75,15 +74,16 @@ def test_powers_are_those_of_the_lift():
 @pytest.mark.parametrize("lag_deg", [0.5, 1.0, 2.0])
 def test_a_device_recruits_less(lag_deg):
     """The PID's setpoint lags: it adds more than a tenth of the estimate, and less than all of it."""
-    env = ElbowLiftEnv(action_mode="pid_setpoint", noise=False, patient="healthy")
+    env = make(ENVIRONMENT, action_mode="pid_setpoint", noise=False, patient="healthy").unwrapped
 
     def run(lag):
         env.reset(seed=1, options={"patient": PATIENT.model_dump()})
-        error, done, over, r = [], 0.0, False, env.packed.values.reading
+        error, done, over = [], 0.0, False
         while not over:
-            error.append(-r[READING.error])
+            error.append(-env.readings()["tracking_error"])
             *_, over, _ = env.step(np.array([-math.radians(lag) / env.drive.setpoint_range, 1.0]))
-            done += max(r[READING.muscle_moment] * r[READING.rate], 0.0) * env.period
+            r = env.readings()
+            done += max(r["muscle_moment"] * r["elbow_angle.rate"], 0.0) * env.period
         return np.array(error), done
 
     error, alone = run(0.0)

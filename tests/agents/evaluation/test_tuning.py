@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from agents.__main__ import main
-from agents.evaluation.evaluate import patient_seeds
+from agents.environment import ENVIRONMENT, make, patient_seeds
 from agents.evaluation.tuning import POPULATION, STREAM, trial, tunable, tune
 from agents.policies.assist_as_needed import AssistAsNeeded
 from agents.policies.baselines import POLICIES, policy
+from agents.policies.lagging_pid import LaggingPid
 from agents.policies.tuned import Range, numbers
-from agents.policies.yielding import YieldingPid
 from dms_core.config_files import configs
 from dms_core.errors import InputError
 from dms_core.yaml_text import read_yaml
@@ -48,10 +48,10 @@ def test_shipped_numbers_are_the_best_of_the_table_of_tries():
 def test_given_numbers_replace_the_tuned_ones():
     used = AssistAsNeeded(memory=2.5)
     assert used.memory == 2.5 and used.gain == numbers("assist_as_needed", AssistAsNeeded.ranges, {})["gain"]
-    with pytest.raises(InputError, match="authority = 2.0; a number from 0.02 to 1"):
-        YieldingPid(authority=2.0)
-    with pytest.raises(InputError, match="numbers authority, lag_deg, patience"):
-        YieldingPid(patience=1.0)
+    with pytest.raises(InputError, match="authority = 2.0: expected a number from 0.02 to 1"):
+        LaggingPid(authority=2.0)
+    with pytest.raises(InputError, match="its numbers are authority, lag_deg, got authority, lag_deg, patience"):
+        LaggingPid(patience=1.0)
 
 
 def test_search_is_repeatable_and_ranked():
@@ -114,10 +114,8 @@ def test_an_unknown_population_is_named():
 
 
 def test_yielding_pid_acts_as_its_numbers_say():
-    import gymnasium
-
-    used = YieldingPid(authority=0.3, lag_deg=2.0)
-    env = gymnasium.make("exo_env:exo/ElbowLift-v1", action_mode="pid_setpoint")
+    used = LaggingPid(authority=0.3, lag_deg=2.0)
+    env = make(ENVIRONMENT, action_mode="pid_setpoint")
     observation, info = env.reset(seed=0)
     used.reset(env)
     np.testing.assert_allclose(used(observation, info), [-np.radians(2.0) / 0.2, -0.4], rtol=1e-12)

@@ -4,8 +4,10 @@ import csv
 
 import pytest
 
+from agents.commands.upper_bound import upper_bound
+from agents.environment import patient_seeds
 from agents.evaluation import upper_bound as tried
-from agents.evaluation.evaluate import episode, patient_seeds, world_of
+from agents.evaluation.episode import episode, world_of
 from agents.policies.baselines import policy
 
 KEPT = ("ability", "pid_return", "pid_share", "pid_rms_deg", "least_share", "linear_share", "best_return")
@@ -18,11 +20,9 @@ def few(monkeypatch):
 
 
 def table(path, repetitions):
-    tried.ceiling(path, "stroke_mild", patients=1, repetitions=repetitions, seed=3)
+    assert upper_bound(path, "stroke_mild", patients=1, repetitions=repetitions, seed=3) == 0
     with path.open() as file:
-        assert file.readline().startswith(
-            "# python -m agents.evaluation.upper_bound --population stroke_mild --patients 1"
-        )
+        assert file.readline().startswith("# python -m agents upper-bound --population stroke_mild --patients 1")
         return list(csv.DictReader(file))
 
 

@@ -7,11 +7,11 @@ import pickle
 import shutil
 import sys
 
-import gymnasium
 import numpy as np
 import pytest
 
 from agents.__main__ import main
+from agents.environment import ENVIRONMENT, make
 from agents.policies.learned import Description, LearnedPolicy, find_policy, world_facts
 from agents.policies.network import ACTIVATIONS, Architecture, Network
 from agents.policies.safetensors import from_bytes, to_bytes
@@ -28,6 +28,7 @@ PARITY = 1e-6
 def trained(tmp_path_factory):
     """Models trained a little, with their policies in numpy."""
     pytest.importorskip("sb3_contrib")
+    from agents.evaluation.episode import judged
     from agents.training.run import TrainingRun
 
     found = {}
@@ -38,7 +39,7 @@ def trained(tmp_path_factory):
             folder = RunFolder(tmp_path_factory.mktemp(algorithm) / "run")
             config = Config.of(content(algorithm, {"eval_every": 10**6}, **changes), algorithm)
             folder.begin(config, 0)
-            run = TrainingRun(folder, config, 0, lambda steps, evaluation: None)
+            run = TrainingRun(folder, config, 0, lambda steps, evaluation: None, judged)
             run.run()
             found[key] = run
         return found[key]
@@ -70,7 +71,7 @@ def shown(run, observations):
 
 def observed(run, count=60):
     generator = np.random.default_rng(5)
-    return generator.normal(0.5, 1.0, (count, run.env.observation_space.shape[0])).astype(np.float32)
+    return generator.normal(0.5, 1.0, (count, run.curve.env.observation_space.shape[0])).astype(np.float32)
 
 
 @pytest.mark.parametrize("algorithm, changes", CASES)
@@ -130,12 +131,12 @@ def test_safetensors_are_those_of_the_package(tmp_path):
 
 def made(tmp_path, **changes):
     """A policy of random numbers, without PyTorch."""
-    env = gymnasium.make("exo_env:exo/ElbowLift-v1", patient="stroke_mild")
+    env = make(ENVIRONMENT, patient="stroke_mild")
     shape = Architecture(inputs=12, hidden=(5,), activation="tanh", output="clip", normalised=True)
     generator = np.random.default_rng(0)
     arrays = {k: generator.uniform(0.1, 1.0, s) for k, s in shape.shapes().items()}
     description = Description(
-        title="made", algorithm="ppo", environment="exo/ElbowLift-v1", exo_env="0", env_kwargs={}, steps=0,
+        title="made", algorithm="ppo", environment=ENVIRONMENT, exo_env="0", env_kwargs={}, steps=0,
         architecture=shape, **{**world_facts(env), **changes},
     )  # fmt: skip
     LearnedPolicy(description, arrays).save(tmp_path / "policy")
@@ -153,13 +154,13 @@ def test_folder_is_evaluated_like_a_baseline(tmp_path, capsys):
 
 def test_evaluation_of_a_run_is_that_of_its_training(trained):
     # The best policy, on the patient that the training set aside, gives the return that the training wrote down.
-    from agents.evaluation.evaluate import episode
+    from agents.evaluation.episode import episode
 
     run = trained("ppo")
     policy = find_policy(str(run.folder.path))
-    env = gymnasium.make("exo_env:exo/ElbowLift-v1", disable_env_checker=True, **run.config.env_kwargs)
+    env = make(ENVIRONMENT, **run.config.env_kwargs)
     best = max(e["return"] for e in run.evaluations)
-    assert episode(env, policy, run.seeds[0])["measures"]["return"] == pytest.approx(best, rel=1e-12)
+    assert episode(env, policy, run.curve.seeds[0])["measures"]["return"] == pytest.approx(best, rel=1e-12)
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "recurrent_ppo"])
@@ -301,7 +302,7 @@ def test_weights_that_do_not_fit_are_named():
     shape = Architecture(inputs=3, hidden=(2,), activation="tanh", output="tanh", normalised=False)
     arrays = {k: np.ones(s) for k, s in shape.shapes().items()}
     for name, value, said in (
-        ("layer.1.bias", None, "lack 'layer.1.bias'"), ("layer.0.weight", np.ones((3, 2)), "shape (3, 2); (2, 3)"),
+        ("layer.1.bias", None, "lack 'layer.1.bias'"), ("layer.0.weight", np.ones((3, 2)), "(3, 2): expected (2, 3)"),
         ("layer.0.bias", np.array([0.0, np.nan]), "not finite"),
     ):  # fmt: skip
         wrong = {k: v for k, v in (arrays | {name: value}).items() if v is not None}
@@ -314,12 +315,12 @@ def test_unknown_policies_are_named(tmp_path):
     (tmp_path / "a").touch()
     for name, said in (
         ("nobody", "There are: assist_as_needed"), (str(tmp_path), "no policy.json"),
-        (str(tmp_path / "nope"), "there is no such folder"), (str(tmp_path / "a"), "is a file; the folder"),
+        (str(tmp_path / "nope"), "there is no such folder"), (str(tmp_path / "a"), "is a file: expected the folder"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=said):
             find_policy(name)
     with pytest.raises(InputError, match="neither"):
-        main_export = __import__("agents.export.export", fromlist=["export"]).export
+        main_export = __import__("agents.commands.export", fromlist=["export"]).export
         main_export(tmp_path, tmp_path / "out")
 
 

@@ -1,14 +1,14 @@
 """Baselines: what they command follows from what they see, and they do what their names say."""
 
-import gymnasium
 import numpy as np
 import pytest
 
+from agents.environment import ENVIRONMENT, make
 from agents.evaluation.evaluate import evaluate
 from agents.policies.assist_as_needed import AssistAsNeeded, gaussians
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.compensation import ANGLES, CompensatedPid, holding_tensions
-from agents.policies.yielding import YieldingPid
+from agents.policies.lagging_pid import LaggingPid
 from dms_core.errors import InputError
 from exo_env.ecosystem.arm import Person
 from exo_env.ecosystem.ecosystem import Ecosystem
@@ -17,8 +17,8 @@ from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
 
 def made(used, seed=0, **settings):
     """An environment for a policy, reset for both."""
-    env = gymnasium.make(
-        "exo_env:exo/ElbowLift-v1", action_mode=used.action_mode, observation=list(used.observation), noise=False,
+    env = make(
+        ENVIRONMENT, action_mode=used.action_mode, observation=list(used.observation), noise=False,
         episode_duration=1.0, **settings,
     )  # fmt: skip
     observation, info = env.reset(seed=seed)
@@ -119,7 +119,7 @@ def test_tensions_give_the_moment_with_one_rope(moment):
 def test_each_does_what_its_name_says():
     # Whole episodes of three patients who hardly help themselves. Of others the compensation does the work twice.
     limp = {"maximum_activation_flexors": 0.05, "maximum_activation_extensors": 0.05}
-    acting = [CompensatedPid(share=1.0, authority=1.0, lag_deg=0.0), YieldingPid(authority=0.3, lag_deg=1.0)]
+    acting = [CompensatedPid(share=1.0, authority=1.0, lag_deg=0.0), LaggingPid(authority=0.3, lag_deg=1.0)]
     acting += [policy(n) for n in ("none", "pid", "assist_as_needed")]
     found = evaluate(acting, {"base": "stroke_severe", "fields": limp}, 3, 7)["policies"]
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from agents.training.config import ENVIRONMENT_ID, Config
+from agents.environment import ENVIRONMENT, check_settings
+from agents.training.config import Config
 from agents.training.rl_zoo_text import read_call, write_call
 from dms_core.config_files import configs
 from dms_core.errors import InputError
@@ -28,13 +29,12 @@ def refused(said, algorithm="ppo", overrides=(), **changes):
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
 def test_shipped_files_are_accepted(path):
     pytest.importorskip("sb3_contrib")
-    from agents.commands.train import check_environment
     from agents.training.algorithms import arguments
 
     config = Config.read(path)
     assert config.training.algorithm == path.stem
     assert set(config.arguments) == set(arguments(config))
-    check_environment(config.env_kwargs)
+    check_settings(config.environment, config.env_kwargs)
 
 
 def test_there_is_a_file_for_every_algorithm():
@@ -47,10 +47,11 @@ def test_there_is_a_file_for_every_algorithm():
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
 def test_rl_zoo3_reads_the_same_values(path):
     # rl_zoo3 reads by PyYAML, in which 1e-4 is text; the environment's section has to be the same for both readers.
-    section = yaml.safe_load(path.read_text())[ENVIRONMENT_ID]
+    section = yaml.safe_load(path.read_text())[ENVIRONMENT]
     for key in ("policy_kwargs", "normalize"):
         if isinstance(section.get(key), str):
             section[key] = read_call(section[key])
+    del section["env_wrapper"]
     assert section == Config.read(path).section
 
 
@@ -61,7 +62,7 @@ def test_rl_zoo3_takes_them(path, tmp_path):
 
     name = {"recurrent_ppo": "ppo_lstm"}.get(path.stem, path.stem)
     manager = zoo.ExperimentManager(
-        Namespace(), name, ENVIRONMENT_ID, str(tmp_path), config=str(path), verbose=0, device="cpu"
+        Namespace(), name, ENVIRONMENT, str(tmp_path), config=str(path), verbose=0, device="cpu"
     )
     model, _ = manager.setup_experiment()
     assert model.get_env().num_envs == Config.read(path).n_envs
@@ -100,27 +101,30 @@ def test_code_is_never_run(text):
     "said, changes",
     [
         ("ppo: unknown key 'learning_rat'. Allowed: batch_size", {"learning_rat": 1e-3}),
-        ("ppo: n_steps = 1.5; a whole number is wanted", {"n_steps": 1.5}),
-        ("ppo: gamma = True; a number is wanted", {"gamma": True}),
-        ("ppo: learning_rate = 'slow'; a number or text like lin_3e-4 is wanted", {"learning_rate": "slow"}),
+        ("ppo: n_steps = 1.5: expected a whole number", {"n_steps": 1.5}),
+        ("ppo: gamma = True: expected a number", {"gamma": True}),
+        ("ppo: learning_rate = 'slow': expected a number or text like lin_3e-4", {"learning_rate": "slow"}),
         ("ppo: clip_range = 'lin_-1'", {"clip_range": "lin_-1"}),
         ("ppo: policy_kwargs: unknown key 'width'", {"policy_kwargs": "dict(width=3)"}),
-        ("ppo: policy_kwargs: net_arch = 'big'; a list of a whole number", {"policy_kwargs": {"net_arch": "big"}}),
-        ("activation_fn = 'os.system'; one of elu", {"policy_kwargs": "dict(activation_fn=os.system)"}),
+        (
+            "ppo: policy_kwargs: net_arch = 'big': expected a list of a whole number",
+            {"policy_kwargs": {"net_arch": "big"}},
+        ),
+        ("activation_fn = 'os.system': expected one of elu", {"policy_kwargs": "dict(activation_fn=os.system)"}),
         ("policy = 'CnnPolicy'; ppo takes MlpPolicy", {"policy": "CnnPolicy"}),
-        ("n_envs = 0; a whole number from 1", {"n_envs": 0}),
+        ("n_envs = 0: expected a whole number from 1", {"n_envs": 0}),
         ("n_timesteps = '1e6'", {"n_timesteps": "1e6"}),
         ("normalize: unknown key 'norm'", {"normalize": {"norm": True}}),
-        ("normalize: clip_obs = -1; a positive number", {"normalize": {"clip_obs": -1}}),
-        ("env_kwargs = 3; a mapping", {"env_kwargs": 3}),
-        ("ppo: unknown key 'env_wrapper'", {"env_wrapper": "a.b"}),
-        ("ppo: gamma = 1.5; a number from 0 to 1 is wanted", {"gamma": 1.5}),
-        ("ppo: gae_lambda = -0.1; a number from 0 to 1 is wanted", {"gae_lambda": -0.1}),
-        ("ppo: gamma = nan; a number from 0 to 1", {"gamma": float("nan")}),
-        ("ppo: learning_rate = -1; a positive number is wanted", {"learning_rate": -1}),
-        ("ppo: learning_rate = 'lin_0.0'; a positive number is wanted", {"learning_rate": "lin_0.0"}),
-        ("ppo: learning_rate = 'lin_1.2.3'; a number or text like lin_3e-4", {"learning_rate": "lin_1.2.3"}),
-        ("ppo: clip_range = 0; a positive number is wanted", {"clip_range": 0}),
+        ("normalize: clip_obs = -1: expected a positive number", {"normalize": {"clip_obs": -1}}),
+        ("env_kwargs = 3: expected a mapping", {"env_kwargs": 3}),
+        ("env_wrapper = 'a.b': expected none, or exo_env.envs", {"env_wrapper": "a.b"}),
+        ("ppo: gamma = 1.5: expected a number from 0 to 1", {"gamma": 1.5}),
+        ("ppo: gae_lambda = -0.1: expected a number from 0 to 1", {"gae_lambda": -0.1}),
+        ("ppo: gamma = nan: expected a number from 0 to 1", {"gamma": float("nan")}),
+        ("ppo: learning_rate = -1: expected a positive number", {"learning_rate": -1}),
+        ("ppo: learning_rate = 'lin_0.0': expected a positive number", {"learning_rate": "lin_0.0"}),
+        ("ppo: learning_rate = 'lin_1.2.3': expected a number or text like lin_3e-4", {"learning_rate": "lin_1.2.3"}),
+        ("ppo: clip_range = 0: expected a positive number", {"clip_range": 0}),
     ],
 )
 def test_mistakes_are_named(said, changes):
@@ -145,7 +149,7 @@ def test_ends_of_a_range_belong_to_it(gamma):
 @pytest.mark.parametrize(
     "said, override",
     [
-        ("--set n_steps: key=value is wanted", "n_steps"),
+        ("--set n_steps: expected key=value", "n_steps"),
         ("--set n_steps.a=1: 'n_steps' is not a mapping", "n_steps.a=1"),
         ("value '[1' is not valid YAML", "n_steps=[1"),
         ("unknown key 'eval'", "training.eval=1"),

@@ -14,8 +14,8 @@ pytest.importorskip("sb3_contrib")
 
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.training.wrappers.action_repeat import Held
-from agents.training.wrappers.low_pass import Traces, kept_shares
+from agents.training.wrappers.action_repeat import ActionRepeat
+from agents.training.wrappers.low_pass import LowPassObservations, kept_shares
 
 LENGTH, HOLD, TIMES = 7, 3, (0.1, 1.0)
 SLOW = {"traces": list(TIMES), "hold": HOLD, "critic": ["privileged"], "eval_every": 10**6}
@@ -48,7 +48,7 @@ def test_traces_are_low_pass_filters_that_an_episode_begins_anew():
     kept = kept_shares(TIMES, 0.02)
     np.testing.assert_allclose(kept, np.exp([-0.2, -0.02]))
     one, other = Numbers(0), Numbers(1)
-    worlds = Traces(DummyVecEnv([lambda: one, lambda: other]), kept, 1)
+    worlds = LowPassObservations(DummyVecEnv([lambda: one, lambda: other]), kept, 1)
     assert worlds.observation_space.shape == (4,)
     seen, last = [worlds.reset()], {}
     for k in range(2 * LENGTH):
@@ -68,7 +68,7 @@ def test_traces_are_low_pass_filters_that_an_episode_begins_anew():
 
 def test_a_network_remembers_and_holds_as_the_worlds_do():
     env, kept = Numbers(3), kept_shares(TIMES, 0.06)
-    worlds = Traces(Held(DummyVecEnv([lambda: env]), HOLD), kept, 2)
+    worlds = LowPassObservations(ActionRepeat(DummyVecEnv([lambda: env]), HOLD), kept, 2)
     wanted = [worlds.reset()[0], worlds.step(np.zeros((1, 1)))[0][0], worlds.step(np.zeros((1, 1)))[0][0]]
     shape = Architecture(
         inputs=6, traces=kept, hold=HOLD, hidden=(), outputs=6, activation="tanh", output="clip", normalised=False
@@ -84,7 +84,7 @@ def test_a_network_remembers_and_holds_as_the_worlds_do():
 
 def test_rewards_of_a_held_action_stop_at_the_end_of_an_episode():
     env = Numbers(0)
-    worlds = Held(DummyVecEnv([lambda: env]), HOLD)
+    worlds = ActionRepeat(DummyVecEnv([lambda: env]), HOLD)
     worlds.reset()
     rewards, ends = [], []
     for action in (0.1, 0.2, 0.3):
@@ -98,15 +98,16 @@ def test_rewards_of_a_held_action_stop_at_the_end_of_an_episode():
 
 
 def test_the_policy_acts_as_in_pytorch_whatever_its_critic_saw(tmp_path):
+    from agents.evaluation.episode import judged
     from agents.training.run import TrainingRun
     from agents.training.run_folder import RunFolder
 
     folder, config = RunFolder(tmp_path / "run"), Config.of(content("ppo", SLOW), "ppo")
     folder.begin(config, 0)
-    run = TrainingRun(folder, config, 0, lambda steps, evaluation: None)
+    run = TrainingRun(folder, config, 0, lambda steps, evaluation: None, judged)
     run.run()
     policy, statistics, kept = run.policy(), run.model.get_vec_normalize_env(), kept_shares(TIMES, HOLD * 0.02)
-    size, everything = run.env.observation_space.shape[0], run.model.observation_space.shape[0]
+    size, everything = run.curve.env.observation_space.shape[0], run.model.observation_space.shape[0]
     assert policy.network.shape.inputs == 3 * size < everything
     generator, memory = np.random.default_rng(5), None
     for k in range(30):

@@ -83,7 +83,7 @@ def test_state_comes_back_to_the_last_bit(algorithm, tmp_path):
     from agents.training.algorithms import build
     from agents.training.config import Config
     from agents.training.model_state import load_state, save_state
-    from agents.training.run import wrapped
+    from agents.training.worlds import wrapped
 
     config = Config.read(config_file(tmp_path, algorithm))
     model = build(config, wrapped(config, 3), 3)
@@ -196,7 +196,7 @@ def test_loaders_name_files_that_pass_the_hash_but_do_not_fit(tmp_path):
     from agents.training.algorithms import build
     from agents.training.config import Config
     from agents.training.model_state import load_state
-    from agents.training.run import wrapped
+    from agents.training.worlds import wrapped
     from dms_core.errors import InputError
 
     path, out = config_file(tmp_path, "sac"), tmp_path / "run"
@@ -220,7 +220,7 @@ def test_loaders_name_files_that_pass_the_hash_but_do_not_fit(tmp_path):
         ("is not the folder of a training", ["--resume", "nowhere"]),
         ("leave out --config", ["--config", "{config}", "--resume", "x"]),
         ("seed = -1", ["--config", "{config}", "--seed", "-1"]),
-        ("ppo.yml' is a file; a new or empty folder", ["--config", "{config}", "--out", "{config}"]),
+        ("ppo.yml' is a file: expected a new or empty folder", ["--config", "{config}", "--out", "{config}"]),
         ("ppo.yml: unknown population 'martians'", ["--config", "{config}", "--set", "env_kwargs.patient=martians"]),
         ("ppo.yml: setting 'wings' is unknown; there are action_mode", ["--config", "{config}", "--set", "env_kwargs.wings=2"]),  # noqa: E501
         ("ppo refuses its arguments", ["--config", "{config}", "--set", "n_steps=1", "n_envs=1"]),
@@ -262,7 +262,7 @@ def test_a_start_killed_before_its_record_is_begun_again(tmp_path):
 
 
 def test_an_unfinished_checkpoint_is_never_taken(tmp_path):
-    from agents.training.checkpoint import Store
+    from agents.checkpoint import Store
 
     def fail(part):
         (part / "half").write_text("x")

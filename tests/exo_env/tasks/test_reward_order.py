@@ -5,8 +5,8 @@ import pytest
 
 from agents.evaluation.evaluate import evaluate
 from agents.policies.baselines import NoAssistance, PidControl
+from agents.policies.lagging_pid import LaggingPid
 from agents.policies.policy import Policy
-from agents.policies.yielding import YieldingPid
 
 REPETITION = {"start_deg": 30.0, "amplitude_deg": 60.0, "rest": 0.5, "duration": 2.0, "pause": 0.5}
 SLACK = {"slacking_rate": 0.3, "effort_recovery": 4.0, "least_effort": 0.2, "co_contraction": 0.2, "feedback_gain": 0.2}
@@ -34,7 +34,7 @@ def returns(policies, **patient):
     return ability, {name: p["episodes"][0]["measures"] for name, p in found.items()}
 
 
-SOFT = YieldingPid(authority=0.2, lag_deg=0.0)
+SOFT = LaggingPid(authority=0.2, lag_deg=0.0)
 IDLE = [NoAssistance(), *(Constant(x) for x in (20.0, 60.0, 100.0))]
 
 

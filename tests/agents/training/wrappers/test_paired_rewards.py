@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from agents.environment import ENVIRONMENT, make, make_vector
 from agents.training.config import Config
 from agents.training.worlds import training_worlds
 from dms_core.errors import InputError
-from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from tests.agents.tiny import content
 
 pytest.importorskip("stable_baselines3")
@@ -31,7 +31,7 @@ def test_the_twins_action_earns_nothing_in_any_episode():
 def test_a_reward_is_that_of_the_world_less_that_of_its_twin():
     action, against = (-0.3, 0.9), (0.1, 0.6)
     worlds = training_worlds(PIDS, WORLDS, 7, against=against)
-    alone = ElbowLiftVectorEnv(2 * WORLDS, autoreset_mode="SameStep", **PIDS)
+    alone = make_vector(ENVIRONMENT, 2 * WORLDS, autoreset_mode="SameStep", **PIDS)
     first = worlds.reset()
     begun, _ = alone.reset(seed=[7, 8, 9, 7, 8, 9])
     np.testing.assert_array_equal(first, begun[:WORLDS])
@@ -39,9 +39,9 @@ def test_a_reward_is_that_of_the_world_less_that_of_its_twin():
     for _ in range(STEPS):
         seen, rewards, over, _ = worlds.step(np.tile(action, (WORLDS, 1)))
         if over.any():
-            own, twins = worlds.get_attr("episode"), worlds.unwrapped.get_attr("episode", range(WORLDS, 2 * WORLDS))
-            for mine, theirs in zip(own, twins, strict=True):
-                assert (mine.patient, mine.load, mine.repetition) == (theirs.patient, theirs.load, theirs.repetition)
+            # Patient, load, movement and start.
+            twins = worlds.unwrapped.env_method("start_info", indices=range(WORLDS, 2 * WORLDS))
+            assert worlds.env_method("start_info") == twins
         there, parts, *_ = alone.step(given)
         np.testing.assert_array_equal(seen, there[:WORLDS])
         single = parts.astype(np.float32)
@@ -59,7 +59,7 @@ def test_a_pair_that_fell_out_of_step_begins_together_again(dropped):
     }  # fmt: skip
     falls, held = (-1.0, -1.0), (-0.6, -1.0)
     action, against = (falls, held) if dropped == "world" else (held, falls)
-    worlds, single = training_worlds(settings, 1, 3, against=against), ElbowLiftEnv(**settings)
+    worlds, single = training_worlds(settings, 1, 3, against=against), make(ENVIRONMENT, **settings)
     worlds.reset()
     single.reset(seed=3)
     times, alone = [], 0.0
@@ -75,9 +75,7 @@ def test_a_pair_that_fell_out_of_step_begins_together_again(dropped):
             assert rewards[0] == np.float32(alone)
         times.append(count)
     assert max(times) < 50 if dropped == "world" else times == [100, 100]
-    (own,) = worlds.get_attr("episode")
-    twin = worlds.unwrapped.get_attr("episode", 1)[0]
-    assert own.patient == twin.patient and own.load == twin.load and own.repetition == twin.repetition
+    assert worlds.env_method("start_info") == worlds.unwrapped.env_method("start_info", indices=1)
     assert seen.shape == (1, worlds.observation_space.shape[0])
     worlds.close()
 

@@ -1,4 +1,4 @@
-"""The paper's PID, made to yield: with part of its authority, and behind the reference by a constant angle.
+"""The paper's PID with part of its authority, and behind the reference by a constant angle, so that it yields.
 
 The simplest things that a therapist can turn down on a device with a PID. Both are tuned for return on the training
 population, see tuning.py; the gains of the PID stay those of `python -m exo_env tune`.
@@ -12,11 +12,13 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
-from agents.policies.policy import Policy
-from agents.policies.tuned import Range, numbers
+from dms_core.renamed import replaced
+
+from .policy import Policy
+from .tuned import Range, numbers
 
 
-class YieldingPid(Policy):
+class LaggingPid(Policy):
     """PID of constant authority on a setpoint behind the reference.
 
     Args:
@@ -39,3 +41,6 @@ class YieldingPid(Policy):
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
         """The same action always."""
         return np.array([-self.lag / self._range, 2.0 * self.authority - 1.0])
+
+
+__getattr__ = replaced(__name__, {"YieldingPid": "It is now LaggingPid."})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
@@ -11,56 +11,74 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
-from agents.policies.learned import Description, LearnedPolicy, world_facts
-from agents.policies.network import Architecture
-from agents.provenance import package_version
-from agents.training.algorithms import ACTIVATIONS
-from agents.training.config import ENVIRONMENT_ID
-from agents.training.wrappers.low_pass import kept_shares
 from dms_core.errors import InputError
+
+from ..policies.learned import Description, LearnedPolicy, world_facts
+from ..policies.network import Architecture
+from ..provenance import package_version
+from .algorithms import ACTIVATIONS
+from .wrappers.low_pass import kept_shares
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a model was trained with."""
+
+    environment: str
+    """Id of the environment."""
+    algorithm: str
+    """Name of the algorithm."""
+    seed: int | None = None
+    """Seed of the training."""
+    env_kwargs: dict[str, Any] = field(default_factory=dict)
+    """Settings of the training environment."""
+    low_pass_times: tuple[float, ...] = ()
+    """Time constants of filtered observations [s]."""
+    action_repeat: int = 1
+    """Control periods that an action is held."""
+
+    @property
+    def title(self) -> str:
+        """In tables."""
+        name = self.algorithm.upper().replace("_", " ")
+        return name if self.seed is None else f"{name}, seed {self.seed}"
 
 
 def extract(
-    model: BaseAlgorithm, env: gymnasium.Env, *, algorithm: str, env_kwargs: dict[str, Any], seed: int | None,
-    normalisation: VecNormalize | None = None, traces: Sequence[float] = (), hold: int = 1,
-) -> LearnedPolicy:  # fmt: skip
+    model: BaseAlgorithm, env: gymnasium.Env, origin: Origin, normalisation: VecNormalize | None = None
+) -> LearnedPolicy:
     """The policy of a model.
 
     Args:
         model: PPO, SAC, TQC or RecurrentPPO on vectors.
         env: one environment of its kind, unstacked.
-        algorithm: its name.
-        env_kwargs: of its training environment.
-        seed: of its training.
+        origin: what it was trained with.
         normalisation: of its observations; of the model's own worlds where it is not given.
-        traces: time constants of filtered observations [s].
-        hold: control periods that an action is held.
 
     Raises:
         InputError: the model's policy has parts that cannot be written down.
     """
     layers, output = _layers(model)
-    cells = _cells(model)
     statistics: Any = normalisation or (model.get_vec_normalize_env() if model.get_env() is not None else None)
-    arrays = layers | cells
+    arrays = layers | _cells(model)
     if statistics is not None and statistics.norm_obs:
         seen = getattr(model.policy, "seen", slice(None))
         arrays |= {"mean": statistics.obs_rms.mean[seen].copy(), "variance": statistics.obs_rms.var[seen].copy()}
-    world: Any = env.unwrapped
-    shape = _architecture(model, arrays, output, env, statistics, kept_shares(traces, hold * world.period), hold)
     description = Description(
-        title=f"{algorithm.upper().replace('_', ' ')}" + ("" if seed is None else f", seed {seed}"),
-        algorithm=algorithm, environment=ENVIRONMENT_ID, exo_env=package_version(), env_kwargs=env_kwargs,
-        architecture=shape, steps=model.num_timesteps, seed=seed, **world_facts(env),
+        title=origin.title, algorithm=origin.algorithm, environment=origin.environment, exo_env=package_version(),
+        env_kwargs=origin.env_kwargs, architecture=_architecture(model, arrays, output, env, statistics, origin),
+        steps=model.num_timesteps, seed=origin.seed, **world_facts(env),
     )  # fmt: skip
     return LearnedPolicy(description, arrays)
 
 
 def _architecture(
     model: BaseAlgorithm, arrays: dict[str, np.ndarray], output: str, env: gymnasium.Env, statistics: Any,
-    kept: tuple[float, ...], hold: int,
+    origin: Origin,
 ) -> Architecture:  # fmt: skip
     """Shape of the network."""
+    world: Any = env.unwrapped
+    kept = kept_shares(origin.low_pass_times, origin.action_repeat * world.period)
     spaces: Any = (model.observation_space, env.observation_space)
     inputs, single = (space.shape[0] for space in spaces)
     inputs = len(getattr(model.policy, "seen", range(inputs)))
@@ -71,7 +89,8 @@ def _architecture(
     cells = sum(name.endswith(".state") for name in arrays)
     normalised = "mean" in arrays
     return Architecture(
-        inputs=inputs, n_stack=inputs // single, traces=kept, hold=hold, hidden=tuple(biases[:-1]), outputs=biases[-1],
+        inputs=inputs, n_stack=inputs // single, traces=kept, hold=origin.action_repeat,
+        hidden=tuple(biases[:-1]), outputs=biases[-1],
         activation=_activation(model), lstm_layers=cells,
         lstm_width=arrays["lstm.0.state"].shape[1] if cells else 0, output="tanh" if output == "tanh" else "clip",
         normalised=normalised,
@@ -92,22 +111,22 @@ def _layers(model: BaseAlgorithm) -> tuple[dict[str, np.ndarray], str]:
         raise InputError(
             f"the {type(policy).__name__} of this model has parts that the exported form does not describe."
         )
-    found = {}
+    arrays = {}
     for k, layer in enumerate(linear):
-        found[f"layer.{k}.weight"], found[f"layer.{k}.bias"] = _array(layer.weight), _array(layer.bias)
-    return found, output
+        arrays[f"layer.{k}.weight"], arrays[f"layer.{k}.bias"] = _array(layer.weight), _array(layer.bias)
+    return arrays, output
 
 
 def _cells(model: BaseAlgorithm) -> dict[str, np.ndarray]:
     """LSTM cells of the actor."""
     lstm = getattr(model.policy, "lstm_actor", None)
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
     for k in range(lstm.num_layers if lstm is not None else 0):
-        found[f"lstm.{k}.input"] = _array(getattr(lstm, f"weight_ih_l{k}"))
-        found[f"lstm.{k}.state"] = _array(getattr(lstm, f"weight_hh_l{k}"))
-        found[f"lstm.{k}.input_bias"] = _array(getattr(lstm, f"bias_ih_l{k}"))
-        found[f"lstm.{k}.state_bias"] = _array(getattr(lstm, f"bias_hh_l{k}"))
-    return found
+        arrays[f"lstm.{k}.input"] = _array(getattr(lstm, f"weight_ih_l{k}"))
+        arrays[f"lstm.{k}.state"] = _array(getattr(lstm, f"weight_hh_l{k}"))
+        arrays[f"lstm.{k}.input_bias"] = _array(getattr(lstm, f"bias_ih_l{k}"))
+        arrays[f"lstm.{k}.state_bias"] = _array(getattr(lstm, f"bias_hh_l{k}"))
+    return arrays
 
 
 def _activation(model: BaseAlgorithm) -> str:

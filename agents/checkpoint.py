@@ -78,10 +78,10 @@ class Store:
         path = self.folder / (self.folder / POINTER).read_text(encoding="utf-8").strip()
         try:
             hashes = json.loads((path / HASHES).read_text(encoding="utf-8"))
-            bad = [name for name, wanted in hashes.items() if digest(path / name) != wanted]
+            bad = [name for name, known in hashes.items() if digest(path / name) != known]
         except (OSError, ValueError, AttributeError) as error:
-            said = error.strerror if isinstance(error, OSError) else f"{HASHES} is no whole JSON"
-            raise InputError(f"checkpoint '{path}' cannot be read ({said}).{self._others(path)}") from None
+            reason = error.strerror if isinstance(error, OSError) else f"{HASHES} is no whole JSON"
+            raise InputError(f"checkpoint '{path}' cannot be read ({reason}).{self._others(path)}") from None
         if bad:
             raise InputError(f"checkpoint '{path}': {bad[0]} is cut off or was changed.{self._others(path)}")
         return path
@@ -95,20 +95,20 @@ class Store:
 
     def _tidy(self, newest: str) -> None:
         """Remove what is not kept, and what a killed process left."""
-        found = sorted(p for p in self.folder.iterdir() if p.is_dir())
-        whole = [p for p in found if not p.name.startswith(".") and p.name <= newest]
-        for path in found:
+        folders = sorted(p for p in self.folder.iterdir() if p.is_dir())
+        whole = [p for p in folders if not p.name.startswith(".") and p.name <= newest]
+        for path in folders:
             if path not in whole[-self.keep :]:
                 shutil.rmtree(path, ignore_errors=True)
 
 
 def digest(path: Path) -> str:
     """SHA-256 of a file."""
-    found = hashlib.sha256()
+    hashed = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(BLOCK):
-            found.update(block)
-    return found.hexdigest()
+            hashed.update(block)
+    return hashed.hexdigest()
 
 
 def _to_disk(path: Path) -> None:

@@ -1,0 +1,45 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from dms_core.errors import InputError
+
+from ..policies.learned import repetitions_of
+from ..policies.policy import Policy
+
+
+def device_settings(exoskeleton: str | None) -> dict[str, Any]:
+    """Settings of the environment for the option --exoskeleton.
+
+    Args:
+        exoskeleton: name of a shipped device, a YAML file, or changes of the default device as JSON; None: the default.
+
+    Raises:
+        InputError: the JSON is not a mapping.
+    """
+    if exoskeleton is None:
+        return {}
+    if not exoskeleton.lstrip().startswith(("{", "[")):
+        return {"exoskeleton": exoskeleton}
+    try:
+        changes = json.loads(exoskeleton)
+    except ValueError as error:
+        raise InputError(f"--exoskeleton {exoskeleton}: expected a name, a YAML file or JSON: {error}.") from None
+    if not isinstance(changes, dict):
+        raise InputError(f'--exoskeleton {exoskeleton}: expected a mapping, for example {{"hinge_damping": 0.1}}.')
+    return {"exoskeleton": changes}
+
+
+def repeated(policies: Sequence[Policy], given: int | None) -> dict[str, Any]:
+    """Settings of the environment for the option --repetitions; none where an episode is as the environment has it.
+
+    Args:
+        policies: that act; without the option there are as many repetitions as the trained ones among them learned.
+        given: the option.
+    """
+    often = repetitions_of(policies, given)
+    return {"repetitions": often} if given is not None or often > 1 else {}

@@ -1,0 +1,75 @@
+"""What a report is made of: learning curves and evaluations, read from what trainings and evaluations left behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dms_core.errors import InputError
+
+from ..evaluation.evaluate import differences
+from ..evaluation.pooling import pooled
+from ..evaluation.report_figures import Group
+from ..training.config import Config
+from ..training.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
+
+EVALUATION = "evaluation.json"
+BEFORE = "exo/ElbowLift-v0"
+"""Environment of evaluations from before they said it."""
+
+
+def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], list[dict[str, Any]]]:
+    """Learning curves by folder, and evaluations; those of the same patients are one.
+
+    Raises:
+        InputError: a path is neither, or a file is not whole.
+    """
+    if not paths:
+        raise InputError("expected folders of trainings or evaluation.json files.")
+    trainings: dict[Path, list[dict[str, Any]]] = {}
+    evaluations: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for path in paths:
+        if (path / RECORD).is_file():
+            trainings[path] = _json(path / EVALUATIONS) if (path / EVALUATIONS).is_file() else []
+        elif path.is_file() or (path / EVALUATION).is_file():
+            one = _json(path if path.is_file() else path / EVALUATION)
+            if not isinstance(one, dict) or not {"population", "patients", "seed", "policies"} <= one.keys():
+                raise InputError(f"'{path}' is not an evaluation.")
+            one.setdefault("environment", BEFORE)
+            settings = json.dumps({"repetitions": 1} | one.get("settings", {}), sort_keys=True)
+            key = (
+                *(one[k] for k in ("environment", "population", "patients", "seed")), settings, *one.get("loads", ()),
+            )  # fmt: skip
+            known = evaluations.setdefault(key, {**one, "policies": {}})
+            known["policies"] |= one["policies"]
+        else:
+            raise InputError(f"'{path}' is neither the folder of a training nor an evaluation.")
+    for known in evaluations.values():
+        known["policies"] |= pooled(known["policies"], known["seed"])
+        first = next(iter(known["policies"].values()))["episodes"]
+        for p in known["policies"].values():
+            p["difference"] = differences(p["episodes"], first, known["seed"], p.get("trainings", 1))
+    return trainings, list(evaluations.values())
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read: {error}.") from None
+
+
+def grouped(trainings: Mapping[Path, list[dict[str, Any]]]) -> list[Group]:
+    """Trainings of one configuration together."""
+    alike: dict[str, list[Path]] = {}
+    for path in trainings:
+        content = Config.read(path / CONFIG).content()
+        alike.setdefault(json.dumps(content, sort_keys=True), []).append(path)
+    names = [read_record(paths[0])["algorithm"] for paths in alike.values()]
+    groups = []
+    for name, paths in zip(names, alike.values(), strict=True):
+        label = name if names.count(name) == 1 else f"{name}, {paths[0].name}"
+        groups.append(Group(label, [trainings[p] for p in paths if trainings[p]]))
+    return [g for g in groups if g.curves]

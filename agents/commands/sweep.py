@@ -1,0 +1,61 @@
+"""`python -m agents sweep`: trainings of several configurations and seeds, shared out by Ray."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from tqdm import tqdm
+from tyro.conf import arg
+
+from dms_core.output_file import check_writable
+
+from ..distributed.cluster import share_out
+from ..distributed.sweep import planned, steps_of, train_share
+from ..environment import PROGRAM
+from ..training.config import Config
+from ..training.usable import require_training
+from .train import STOPPED
+
+
+def sweep(
+    configs: tuple[Path, ...],
+    out: Path,
+    seeds: tuple[int, ...] = (0, 1, 2),
+    changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
+    address: str | None = None,
+    cpus: int | None = None,
+    environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
+) -> int:
+    """Train every configuration with every seed; the same command again goes on where it was stopped.
+
+    Args:
+        configs: YAML files in the format of rl_zoo3, as in configs/agents.
+        out: folder of the trainings, one in each CONFIG_SEED; with a cluster, one that all its machines see.
+        seeds: of the trainings.
+        changes: values that replace those of all configurations.
+        address: of a Ray cluster, or 'auto' for that of this machine; a local one is started where it is not given.
+        cpus: processes of a local one.
+        environment: id of the section to take of each file, where it has several.
+    """
+    require_training()
+    shares = planned(configs, seeds, changes, out, environment)
+    check_writable(out / "sweep.json")
+    total = sum(Config.of(content, "").n_timesteps for content, _, _ in shares)
+    with tqdm(total=total, unit="step", unit_scale=True, leave=False, disable=None) as bar:
+
+        def show_progress() -> None:
+            bar.update(min(sum(steps_of(Path(folder)) for _, _, folder in shares), total) - bar.n)
+
+        try:
+            best_ones = share_out(
+                train_share, shares, address=address, cpus=cpus, waiting=show_progress,
+                done=lambda k: bar.write(f"done: {shares[k][2]}"),
+            )  # fmt: skip
+        except KeyboardInterrupt:
+            print("stopped; the same command goes on from the last checkpoints")
+            return STOPPED
+    for (_, _, folder), best in zip(shares, best_ones, strict=True):
+        print(f"{folder}: best return {best['return']:.4g} after {best['steps']} steps")
+    print(f"figures: {PROGRAM} report {' '.join(folder for _, _, folder in shares)} --out {out / 'report'}")
+    return 0

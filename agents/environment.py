@@ -1,0 +1,165 @@
+"""The environments that policies act in, by id: the one place where they are looked up and made.
+
+Any environment that is registered with Gymnasium and has the face of this package will do; one of another package is
+named with the module that registers it, "module:namespace/Name-v0".
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium.envs.registration import EnvSpec, load_env_creator, parse_env_id
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+import exo_env  # noqa: F401  Importing it registers its environments.
+from dms_core.errors import InputError, choices
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.vec_env import VecEnv
+
+ENVIRONMENT = "exo/ElbowLift-v0"
+"""The environment where none is named."""
+PROGRAM = f"python -m {__name__.partition('.')[0]}"
+"""This command line, under the name by which it is installed."""
+
+
+def environment_id(environment: str, say: bool = True) -> str:
+    """The id under which an environment is registered now, in place of an older version of it.
+
+    Args:
+        environment: an id, with or without the module that registers it: "exo/ElbowLift-v0", "module:mine/Task-v1".
+        say: tell the user where a newer version takes the place of an older one.
+
+    Raises:
+        InputError: no environment of this name is registered, or the version is newer than those that are.
+    """
+    module, _, name = environment.rpartition(":")
+    if module:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise InputError(f"environment '{environment}': module '{module}' cannot be imported: {error}.") from None
+    newest = _newest(name)
+    if newest is None:
+        raise InputError(f"environment '{environment}' is not registered. There are: {choices(environments())}.")
+    if newest != name and say:
+        _say_once(f"note: {name} is now {newest}, which is used in its place.")
+    return newest
+
+
+def environments() -> list[str]:
+    """Ids of the environments that come with this package."""
+    return [name for name in gymnasium.registry if name.startswith("exo/")]
+
+
+def _newest(name: str) -> str | None:
+    """The id itself, the newest version where it is an older one, or None."""
+    try:
+        namespace, base, version = parse_env_id(name)
+    except gymnasium.error.Error:
+        return None
+    same = [s for s in gymnasium.registry.values() if (s.namespace, s.name) == (namespace, base)]
+    versions = {s.version: s.id for s in same if s.version is not None}
+    if name in gymnasium.registry and (version is None or name not in environments()):
+        return name
+    if version is None or not versions or version > max(versions):
+        return None
+    return versions[max(versions)]
+
+
+@cache
+def _say_once(sentence: str) -> None:
+    print(sentence, file=sys.stderr)
+
+
+def spec_of(environment: str) -> EnvSpec:
+    """What is registered under an id.
+
+    Raises:
+        InputError: there is nothing.
+    """
+    return gymnasium.spec(environment_id(environment))
+
+
+def make(environment: str, **settings: Any) -> gymnasium.Env:
+    """One environment.
+
+    Args:
+        environment: its id.
+        settings: arguments of the environment, over those of its registration.
+
+    Raises:
+        InputError: the id is not registered, or a setting is not usable.
+    """
+    return gymnasium.make(environment_id(environment), disable_env_checker=True, **settings)
+
+
+def check_settings(environment: str, settings: Mapping[str, Any]) -> None:
+    """Refuse settings that no environment can be made with; nothing is compiled.
+
+    Raises:
+        InputError: names the setting.
+    """
+    spec = spec_of(environment)
+    assert spec.entry_point is not None
+    creator = spec.entry_point if callable(spec.entry_point) else load_env_creator(spec.entry_point)
+    creator(**{**spec.kwargs, **settings}).close()
+
+
+def make_vector(environment: str, num_envs: int, **settings: Any) -> VectorEnv:
+    """Many worlds in one compiled batch.
+
+    Args:
+        environment: its id.
+        num_envs: number of worlds.
+        settings: arguments of the vector environment and of its worlds, over those of the registration.
+
+    Raises:
+        InputError: the id is not registered, has no vector environment, or a setting is not usable.
+    """
+    spec = spec_of(environment)
+    if spec.vector_entry_point is None:
+        raise InputError(
+            f"environment '{environment}' has no vector environment, which training needs; register it with a "
+            "vector_entry_point."
+        )
+    entry: Any = spec.vector_entry_point
+    creator: Any = entry if callable(entry) else load_env_creator(entry)
+    return creator(num_envs, **{**spec.kwargs, **settings})
+
+
+def make_sb3_worlds(environment: str, num_envs: int, **settings: Any) -> VecEnv:
+    """Many worlds as Stable-Baselines3 takes them; each resets itself in the step that ends its episode.
+
+    Args:
+        environment: its id.
+        num_envs: number of worlds.
+        settings: as for `make_vector`.
+
+    Raises:
+        InputError: as `make_vector`.
+    """
+    from stable_baselines3.common.vec_env import VecEnv
+
+    from exo_env.envs.stable_baselines import ElbowLiftVecEnv
+
+    class Worlds(ElbowLiftVecEnv):
+        """The adapter of exo_env around the vector environment of an id."""
+
+        def __init__(self, worlds: Any) -> None:
+            self.worlds, self.render_mode, self.metadata = worlds, worlds.render_mode, worlds.metadata
+            VecEnv.__init__(self, worlds.num_envs, worlds.single_observation_space, worlds.single_action_space)
+            self._actions = None
+
+    return Worlds(make_vector(environment, num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **settings))
+
+
+def patient_seeds(seed: int, patients: int) -> list[int]:
+    """Seeds of the episodes of an evaluation, one a patient; more patients keep those of fewer."""
+    return [int(x) for x in np.random.SeedSequence(seed).generate_state(patients)]

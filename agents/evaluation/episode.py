@@ -1,0 +1,80 @@
+"""One episode of a policy, measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+
+from exo_env.patient.population import Source
+from exo_env.tasks.movement import Repetition
+
+from ..environment import ENVIRONMENT, make
+from ..policies.policy import Policy
+from .measures import MOVEMENT, Record, left_out, measured
+
+ABOUT = ("load", "ability", "reference", "patient")
+"""What is kept of the `info` of a reset, where it is in there."""
+
+
+def world_of(policy: Policy, patient: Source, environment: str = ENVIRONMENT, **settings: Any) -> gymnasium.Env:
+    """The environment that a policy acts in.
+
+    Args:
+        policy: says the action mode and what it sees.
+        patient: population or patient.
+        environment: its id.
+        settings: further ones of the environment.
+    """
+    return make(
+        environment, patient=patient, action_mode=policy.action_mode, observation=list(policy.observation), **settings
+    )
+
+
+def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> dict[str, Any]:
+    """Run one episode.
+
+    Args:
+        env: in which.
+        acting: the policy.
+        seed: of the episode.
+        load: in place of the one that the seed draws [kg].
+
+    Returns:
+        "measures", "event", which ended it or None, what `info` of the reset says of patient, load and movement, and
+        "left_out", the measures that the environment does not allow.
+    """
+    world: Any = env.unwrapped
+    observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
+    info = drawn
+    acting.reset(env)
+    record = Record(movement_of(env, drawn), world.period)
+    record.add(world.readings())
+    over = False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(acting(observation, info))
+        record.add_step(float(reward), info)
+        record.add(world.readings())
+        over = terminated or truncated
+    record.event = info.get("event")
+    return {
+        **{k: drawn[k] for k in ABOUT if k in drawn},
+        "event": record.event,
+        "measures": measured(record),
+        "left_out": left_out(record),
+    }
+
+
+def judged(env: gymnasium.Env, acting: Policy, seeds: Sequence[int]) -> list[dict[str, Any]]:
+    """Measures of an episode with each seed; what a training is watched by."""
+    return [episode(env, acting, seed)["measures"] for seed in seeds]
+
+
+def movement_of(env: gymnasium.Env, drawn: dict[str, Any]) -> Repetition | None:
+    """The movement of an episode as a reset tells it, None where the environment has none."""
+    if MOVEMENT not in drawn:
+        return None
+    world: Any = env.unwrapped
+    count = 1 if env.spec is None else int(env.spec.kwargs.get("repetitions", 1))
+    return Repetition(**drawn[MOVEMENT], count=count, every=world.duration / count)

@@ -1,0 +1,77 @@
+"""Models that Stable-Baselines3 saved elsewhere, as policies."""
+
+from __future__ import annotations
+
+import pickle
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from dms_core.errors import DmsError, InputError
+
+from ..environment import ENVIRONMENT, environment_id, make
+from ..policies.learned import LearnedPolicy
+from ..training.usable import require_training
+
+
+def from_zip(
+    source: Path, statistics: Path | None, algorithm: str, trust: bool, environment: str = ENVIRONMENT
+) -> LearnedPolicy:
+    """The policy of a file that Stable-Baselines3 saved elsewhere.
+
+    Args:
+        source: the file.
+        statistics: vecnormalize.pkl, where observations were normalised.
+        algorithm: that trained it.
+        trust: whether the user trusts who made the files.
+        environment: id of that in which it was trained.
+
+    Raises:
+        InputError: it is not trusted, not whole, or was trained on other observations.
+    """
+    if not trust:
+        raise InputError(
+            f"'{source}' carries pickles, which can run any code when they are read. If you trust who made it, give "
+            "--trust."
+        )
+    require_training()
+    from ..training.algorithms import find
+    from ..training.extraction import Origin, extract
+
+    model, env = _read(find(algorithm), source), make(environment)
+    try:
+        origin = Origin(environment_id(environment), algorithm, model.seed)
+        return extract(model, env, origin, _statistics(statistics))
+    except AttributeError as error:
+        raise InputError(f"'{source}' is not a model of {algorithm}: {error}.") from None
+    finally:
+        env.close()
+
+
+def _read(kind: Any, source: Path) -> Any:
+    """A model, pickles and all."""
+    try:
+        return kind.load(source, device="cpu")
+    except OSError as error:
+        raise InputError(f"'{source}' cannot be read: {error.strerror}.") from None
+    except (ValueError, RuntimeError, KeyError, TypeError, AssertionError, EOFError, zipfile.BadZipFile) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"'{source}' is no whole model of {kind.__name__}: {reason}") from None
+
+
+def _statistics(path: Path | None) -> Any:
+    """A VecNormalize, pickled."""
+    if path is None:
+        return None
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    try:
+        with path.open("rb") as file:
+            content = pickle.load(file)
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read: {error.strerror}.") from None
+    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError) as error:
+        raise InputError(f"'{path}' is no whole pickle: {error}.") from None
+    if not isinstance(content, VecNormalize):
+        raise DmsError(f"'{path}' holds a {type(content).__name__}: expected a VecNormalize.")
+    return content

@@ -1,0 +1,46 @@
+"""Whether a training is possible at all: the packages it needs, and a configuration that can be trained."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dms_core.errors import DmsError, InputError, extra
+
+from ..environment import check_settings
+from .config import Config
+
+
+def require_training() -> None:
+    """Say what to install where training is not possible.
+
+    Raises:
+        DmsError: a package is missing.
+    """
+    try:
+        import sb3_contrib  # noqa: F401
+        import stable_baselines3  # noqa: F401
+        import tensorboard  # noqa: F401
+    except ImportError as error:
+        raise DmsError(f"training needs {error.name}. {extra('train')}") from None
+
+
+def checked_config(path: Path, changes: tuple[str, ...], environment: str | None = None) -> Config:
+    """A configuration that can be trained.
+
+    Args:
+        path: its file.
+        changes: values that replace those of the file.
+        environment: id of the section to take, see `Config.read`.
+
+    Raises:
+        InputError: names file, key and value.
+    """
+    from .algorithms import arguments
+
+    config = Config.read(path, changes, environment)
+    try:
+        arguments(config)
+        check_settings(config.environment, config.env_kwargs)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return config

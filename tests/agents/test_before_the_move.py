@@ -1,0 +1,131 @@
+"""What users made with version 0.1.0 loads, goes on and is evaluated (before_the_move/README.md)."""
+
+import json
+import shutil
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.__main__ import main
+from agents.environment import ENVIRONMENT
+from agents.evaluation.evaluate import evaluate
+from agents.policies.learned import find_policy
+from agents.training.config import Config
+
+FILES = Path(__file__).with_name("before_the_move")
+ALGORITHMS = ("ppo", "sac", "tqc", "recurrent_ppo")
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def trainings(tmp_path):
+    """Folders of the trainings, to be written to."""
+    with tarfile.open(FILES / "trainings.tar.xz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    return tmp_path
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_configurations_are_read(algorithm):
+    config = Config.read(FILES / f"{algorithm}.yml")
+    assert config.environment == ENVIRONMENT and config.training.algorithm == algorithm
+    if algorithm == "ppo":
+        t = config.training
+        assert (t.traces, t.hold, t.start, t.against) == ((0.1, 1.0), 2, (-0.05, 0.9), (-0.05, 1.0))
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_trainings_go_on(algorithm, trainings):
+    pytest.importorskip("sb3_contrib")
+    folder = trainings / algorithm
+    before = json.loads((folder / "evaluations.json").read_text())
+    assert main(["train", "--resume", str(folder), "--set", "n_timesteps=128"]) == 0
+    curve = json.loads((folder / "evaluations.json").read_text())
+    assert curve[: len(before)] == before and curve[-1]["steps"] == 128
+    assert main(["export", str(folder), "--last", "--no-onnx", "--out", str(trainings / "out")]) == 0
+
+
+@pytest.mark.parametrize("name", ["policy", "policy_lstm"])
+def test_policies_act(name):
+    one = find_policy(str(FILES / name))
+    assert one.description.env_kwargs["patient"] == "stroke_mild"
+    observation = np.random.default_rng(0).normal(size=12).astype(np.float32)
+    assert np.abs(one(observation, {})).max() <= 1.0
+
+
+def test_a_policy_from_a_training_and_a_population_file_are_evaluated(trainings, tmp_path):
+    one = find_policy(str(trainings / "ppo"))
+    found = evaluate([one], str(FILES / "population.yaml"), 1, 0, episode_duration=0.4)
+    assert found["population"] == "weak and forgetful"
+    (episode,) = found["policies"][one.name]["episodes"]
+    assert episode["patient"]["slacking_rate"] == 0.6 and 0.5 <= episode["patient"]["strength"] <= 0.8
+
+
+def test_a_report_takes_evaluations_and_trainings(trainings, tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("sb3_contrib")
+    shutil.copytree(FILES / "policy", tmp_path / "policy", dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", str(FILES / "evaluation.json"), "ppo", "sac", "--out", "out"]) == 0
+    text = (tmp_path / "out" / "report.md").read_text()
+    assert "| ppo | ppo | 0 |" in text and "weak and forgetful" in text and "Worst patient" in text
+
+
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("learned", "policies.learned"),
+        ("train", "training.run"),
+        ("evaluate", "evaluation.evaluate"),
+        ("traces", "training.wrappers.low_pass"),
+        ("rllib", "distributed.rllib"),
+    ],
+)
+def test_old_imports_work_with_a_warning(old, new):
+    pytest.importorskip("sb3_contrib")
+    code = (
+        "import importlib, warnings; warnings.simplefilter('error', FutureWarning)\n"
+        f"try: import agents.{old}\n"
+        "except FutureWarning as warning: print(warning)\n"
+        "warnings.simplefilter('ignore')\n"
+        f"print(importlib.import_module('agents.{old}') is importlib.import_module('agents.{new}'))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [f"'agents.{old}' is now 'agents.{new}'; import it by that name.", "True"]
+
+
+def test_every_old_module_is_somewhere():
+    from importlib.util import find_spec
+
+    from agents.old_names import MOVED
+
+    for new in MOVED.values():
+        assert find_spec(f"agents.{new}") is not None, new
+
+
+@pytest.mark.parametrize(
+    "module, name, said",
+    [
+        ("agents.policies.lagging_pid", "YieldingPid", "LaggingPid"),
+        ("agents.training.wrappers.action_repeat", "Held", "ActionRepeat"),
+        ("agents.evaluation.time_course", "course", "time_course"),
+        ("agents.export", "from_zip", "agents.export.model_zip.from_zip"),
+    ],
+)
+def test_names_that_are_gone_say_what_replaces_them(module, name, said):
+    import importlib
+
+    pytest.importorskip("stable_baselines3")
+    with pytest.raises(AttributeError, match=f"It is now {said}"):
+        getattr(importlib.import_module(module), name)
+
+
+def test_the_module_of_the_upper_bound_names_the_command():
+    done = subprocess.run([sys.executable, "-m", "agents.ceiling"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "'python -m agents.ceiling' is now 'python -m agents upper-bound', with the same options.\n"
