@@ -23,7 +23,7 @@ from dms_core.errors import InputError, choices
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
-ENVIRONMENT = "exo/ElbowLift-v0"
+ENVIRONMENT = "exo/ElbowLift-v1"
 """The environment where none is named."""
 PROGRAM = f"python -m {__name__.partition('.')[0]}"
 """This command line, under the name by which it is installed."""
@@ -33,7 +33,7 @@ def environment_id(environment: str, say: bool = True) -> str:
     """The id under which an environment is registered now, in place of an older version of it.
 
     Args:
-        environment: an id, with or without the module that registers it: "exo/ElbowLift-v0", "module:mine/Task-v1".
+        environment: an id, with or without the module that registers it: "exo/ElbowLift-v1", "module:mine/Task-v1".
         say: tell the user where a newer version takes the place of an older one.
 
     Raises:
@@ -145,19 +145,10 @@ def make_sb3_worlds(environment: str, num_envs: int, **settings: Any) -> VecEnv:
     Raises:
         InputError: as `make_vector`.
     """
-    from stable_baselines3.common.vec_env import VecEnv
+    from exo_env.envs.stable_baselines import AssistanceVecEnv
 
-    from exo_env.envs.stable_baselines import ElbowLiftVecEnv
-
-    class Worlds(ElbowLiftVecEnv):
-        """The adapter of exo_env around the vector environment of an id."""
-
-        def __init__(self, worlds: Any) -> None:
-            self.worlds, self.render_mode, self.metadata = worlds, worlds.render_mode, worlds.metadata
-            VecEnv.__init__(self, worlds.num_envs, worlds.single_observation_space, worlds.single_action_space)
-            self._actions = None
-
-    return Worlds(make_vector(environment, num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **settings))
+    worlds: Any = make_vector(environment, num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
+    return AssistanceVecEnv(worlds)
 
 
 def patient_seeds(seed: int, patients: int) -> list[int]:

@@ -24,6 +24,6 @@ class HalfAuthority(Policy):
 
 found = evaluate([HalfAuthority(), POLICIES["pid"]()], "stroke_mild", patients=3, seed=0, episode_duration=3.0)
 for name, policy in found["policies"].items():
-    print(f"{name:5} return {policy['summary']['return']['estimate']:.1f}")
+    print(f"{name:5} return {policy['summary']['return']['value']:.1f}")
 
 # From the command line, beside others: python -m agents evaluate --policy pid own_policy:HalfAuthority --out out/mine

@@ -190,7 +190,7 @@ def arm26(
 
 
 def soak(steps: int = 100_000, population: str = "evaluation", seed: int = 0, action_mode: str = "rope_tension") -> int:
-    """Random actions in exo/ElbowLift-v0, a new patient an episode: counts of what happened and the worst figures.
+    """Random actions in exo/ElbowLift-v1, a new patient an episode: counts of what happened and the worst figures.
 
     Args:
         steps: control periods in all.

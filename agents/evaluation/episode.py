@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 
 from exo_env.patient.population import Source
-from exo_env.tasks.movement import Repetition
+from exo_env.tasks.repetition import Repetition
 
 from ..environment import ENVIRONMENT, make
 from ..policies.policy import Policy

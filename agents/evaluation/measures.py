@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.tasks.movement import Repetition
+from exo_env.tasks.repetition import Repetition
 
 SPARC_CUTOFF, SPARC_THRESHOLD, SPARC_PADDING = 10.0, 0.05, 4
 """Largest frequency [Hz], least amplitude [-], doublings of the transform's length (Balasubramanian et al. 2015)."""

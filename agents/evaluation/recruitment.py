@@ -22,7 +22,6 @@ import math
 import numpy as np
 
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.patient.effort import SIGN
 from exo_env.patient.motor_command import InternalModel
 from exo_env.patient.patient import Patient
 from exo_env.patient.static_optimisation import needed_moments
@@ -53,7 +52,7 @@ def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray]:
     known = InternalModel.of(episode.arm, machine, patient.expected_load * episode.load)
     course, planned = episode.course[:n], np.empty(n)
     needed_moments(known.arm, known.load, course, planned)
-    flexed = np.where(np.array(SIGN) > 0.0, 1.0, MINIMUM)
+    flexed = np.where(episode.arm.signs > 0.0, 1.0, MINIMUM)
     rate, full = course[:, 1], np.array([known.muscle_moment(psi, flexed) for psi in course[:, 0]])
     return np.maximum(planned * rate, 0.0), np.maximum(full * rate, 0.0)
 

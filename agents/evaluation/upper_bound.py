@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, SimulationError, choices
-from exo_env.tasks.movement import Repetition
+from exo_env.tasks.repetition import Repetition
 from exo_env.world.episode import Episode
 
 from ..environment import ENVIRONMENT, make_vector, patient_seeds

@@ -21,8 +21,6 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
-from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
-
 from .policy import Channels, Policy
 from .tuned import Range, numbers
 
@@ -70,7 +68,9 @@ class AssistAsNeeded(Policy):
         angle, rate, reference, reference_rate = (self._channels.read(observation, n) for n in names)
         error, error_rate = reference - angle, reference_rate - rate
         if self.weights is None:
-            held = self._channels.read(observation, "tension") * self._device.moment_arm(AGONIST, angle)
+            rope = self._device.lifting_rope
+            place = list(self._device.ropes).index(rope)
+            held = self._channels.read(observation, "tension", place) * self._device.moment_arm(rope, angle)
             self.weights = np.full(CENTRES.size, held)
         basis = gaussians(angle)
         self.learn(basis, error, error_rate)
@@ -86,8 +86,10 @@ class AssistAsNeeded(Policy):
         self.weights = self.weights + self._period * self.gain * basis * (error_rate + self.slope * error)
 
     def _action(self, moment: float, angle: float) -> np.ndarray:
-        """Commands of both ropes that give a moment [Nm]; one of them is slack."""
-        tensions = [max(moment / self._device.moment_arm(rope, angle), 0.0) for rope in (AGONIST, ANTAGONIST)]
+        """Commands of the ropes that give a moment [Nm]: one that flexes or one that extends, all others slack."""
+        device = self._device
+        used = device.lifting_rope if moment > 0.0 else device.lowering_rope
+        tensions = [max(moment / device.moment_arm(r, angle), 0.0) if r == used else 0.0 for r in device.ropes]
         return np.clip(2.0 * np.array(tensions) / self._largest - 1.0, -1.0, 1.0)
 
 

@@ -22,9 +22,8 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
-from exo_env.ecosystem.arm import Arm, Person
+from exo_env.ecosystem.arm import Person
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.ecosystem.exoskeleton import AGONIST
 from exo_env.patient.motor_command import InternalModel
 
 from .lagging_pid import LaggingPid
@@ -47,10 +46,11 @@ def holding_tensions(ecosystem: Ecosystem, person: Person, load: float, angles: 
         angles: of the elbow [rad], shape (n,).
     """
     assert ecosystem.machine is not None
-    arm, device = Arm(person), ecosystem.device
+    arm, device = ecosystem.changed(person=person).arm(), ecosystem.device
     known, g = InternalModel.of(arm, ecosystem.machine, load), float(np.linalg.norm(arm.gravity))
     moments = [known.resting_moment(angle) + device.own_moment(angle, g) for angle in map(float, angles)]
-    return np.array(moments) / [device.moment_arm(AGONIST, angle) for angle in map(float, angles)]
+    rope = device.lifting_rope
+    return np.array(moments) / [device.moment_arm(rope, angle) for angle in map(float, angles)]
 
 
 class CompensatedPid(Policy):

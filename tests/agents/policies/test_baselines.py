@@ -12,7 +12,6 @@ from agents.policies.lagging_pid import LaggingPid
 from dms_core.errors import InputError
 from exo_env.ecosystem.arm import Person
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.ecosystem.exoskeleton import AGONIST, ANTAGONIST
 
 
 def made(used, seed=0, **settings):
@@ -111,7 +110,7 @@ def test_tensions_give_the_moment_with_one_rope(moment):
     env, _, _ = made(used)
     device, angle = env.unwrapped.ecosystem.device, 1.1
     tensions = 0.5 * (used._action(moment, angle) + 1.0) * np.array(env.unwrapped.drive.max_tension)
-    arms = [device.moment_arm(rope, angle) for rope in (AGONIST, ANTAGONIST)]
+    arms = [device.moment_arm(rope, angle) for rope in device.ropes]
     assert tensions @ arms == pytest.approx(moment, abs=1e-12)
     assert tensions.min() == 0.0
 
