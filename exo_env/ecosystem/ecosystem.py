@@ -19,6 +19,7 @@ from dms_core.model.element import Constraint, Force
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.signals import AnySignal
 from exo_env.ecosystem.arm import ELBOW, Arm, excitation_name
+from exo_env.ecosystem.exoskeleton import DEFAULT as DEFAULT_DEVICE
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine, LoadedMachine
 from exo_env.ecosystem.person import Person
@@ -57,7 +58,7 @@ class Ecosystem(Settings):
 
     person: Person = Person()
     subject: str = Field(default=DEFAULT, description="anatomy: a shipped subject by name, or a YAML file")
-    device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.from_config("exoskeletons/elbow.yaml"))
+    device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.named(DEFAULT_DEVICE))
     machine: GymMachine | None = Field(
         default_factory=lambda: GymMachine.from_config("gym_machine/pulley.yaml"), description="None: the hand is empty"
     )

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
-from dms_core.yaml_text import read_yaml
-from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.exoskeleton import DEFAULT as DEFAULT_DEVICE
+from exo_env.ecosystem.exoskeleton import Exoskeleton, shipped_devices
 from exo_env.ecosystem.subject import DEFAULT
 from exo_env.ecosystem.worn_exoskeleton import Misalignment
 from exo_env.patient.distributions import Distribution, distribution
@@ -117,32 +115,17 @@ def worn_device(source: Any) -> Exoskeleton:
     Raises:
         InputError: it is none of these, or a value is wrong.
     """
-    shipped = sorted(p.stem for p in (configs() / "exoskeletons").glob("*.yaml"))
+    if isinstance(source, str):
+        return Exoskeleton.named(source)
     if source is None or isinstance(source, Mapping):
         try:
-            return Exoskeleton.from_config("exoskeletons/elbow.yaml").changed(**(source or {}))
+            return Exoskeleton.named(DEFAULT_DEVICE).changed(**(source or {}))
         except InputError as error:
             raise InputError(f"exoskeleton: {error}") from None
-    if isinstance(source, str) and source.endswith((".yaml", ".yml")):
-        return read_device(source)
-    if source not in shipped:
-        raise InputError(
-            f"exoskeleton = {source!r}: expected one of {choices(shipped)}, a YAML file, or a mapping of changes of "
-            "the default device."
-        )
-    return Exoskeleton.from_config(f"exoskeletons/{source}.yaml")
-
-
-def read_device(path: str | Path) -> Exoskeleton:
-    """A device from a YAML file; configs/exoskeletons/elbow.yaml shows every key.
-
-    Raises:
-        InputError: the file is missing or wrong; names file, key and value.
-    """
-    try:
-        return Exoskeleton(**read_yaml(path))
-    except InputError as error:
-        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+    raise InputError(
+        f"exoskeleton = {source!r}: expected one of {choices(shipped_devices())}, a YAML file, or a mapping of changes "
+        "of the default device."
+    )
 
 
 def worn_misalignment(source: Any) -> Misalignment:
