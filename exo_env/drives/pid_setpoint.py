@@ -35,11 +35,11 @@ class PidSetpoint(Drive):
     authority_rate: float = Field(default=10.0, gt=0.0, description="largest change of the authority [1/s]; assumed")
 
     def actions(self, device: Exoskeleton) -> tuple[str, ...]:
-        """Setpoint and authority."""
+        """Change of the setpoint, and authority."""
         return "setpoint change", "authority"
 
     def commands(self, device: Exoskeleton) -> tuple[Command, ...]:
-        """No change, and half of the authority, as for an action of zeros."""
+        """Change of the setpoint and authority; an episode begins with none and a half, as for an action of zeros."""
         return Command(SETPOINT, math.inf), Command(ASSISTANCE, self.authority_rate, start=0.5)
 
     def numbers(self, device: Exoskeleton) -> np.ndarray:

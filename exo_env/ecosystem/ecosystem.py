@@ -35,13 +35,13 @@ class Part(Protocol):
     """What joins the system beside arm, device and machine."""
 
     def bodies(self, flexion: float) -> Sequence[RigidBody]:
-        """Its bodies where the elbow rests at an angle [rad]."""
+        """Bodies of the part where the elbow rests at an angle [rad]."""
 
     def joints(self) -> Sequence[Constraint]:
-        """What holds them."""
+        """Joints that hold these bodies."""
 
     def forces(self) -> Sequence[Force]:
-        """What acts on them, or on the bodies of arm, device and machine."""
+        """Forces on these bodies, or on those of arm, device and machine."""
 
 
 class Proprioception(Settings):
@@ -54,7 +54,7 @@ class Proprioception(Settings):
 
 
 class Ecosystem(Settings):
-    """What is joined. The defaults are the paper's system with arm26 and one kilogram."""
+    """Person, device and machine that are joined. The defaults are the paper's system with arm26 and one kilogram."""
 
     person: Person = Person()
     subject: str = Field(default=DEFAULT, description="anatomy: a shipped subject by name, or a YAML file")
@@ -110,11 +110,11 @@ class Ecosystem(Settings):
 
         Args:
             start: elbow angle [rad].
-            reference: course of psi [rad].
-            excitations: course of each muscle's excitation [-]; a muscle that is not named stays at its minimum.
+            reference: psi over time [rad].
+            excitations: excitation of each muscle over time [-]; a muscle that is not named stays at its minimum.
             assistance: authority of the controller, 0 to 1 [-].
             start_activation: activation of each muscle at the start [-]; default: the minimum.
-            start_tension: of the rope that lifts [N]; default: that of a command without error.
+            start_tension: tension of the rope that lifts [N]; default: that of a command without error.
             muscle_times: activation and deactivation time constants of every muscle, as fields of ThelenMuscle [s].
             device_forces: controller, motors and ropes of the worn device; default: its own PID on all ropes.
             device_inputs: inputs that these read beside the reference; default: the authority.

@@ -63,8 +63,8 @@ class WornExoskeleton:
 
     Args:
         device: the exoskeleton.
-        arm: whose humerus carries it.
-        misalignment: how it sits.
+        arm: arm whose humerus carries it.
+        misalignment: how the device is worn.
         guide: 'plane' (one row), 'line' (two) or 'slider' (five).
     """
 
@@ -129,7 +129,7 @@ class WornExoskeleton:
             reference: name of the input psi(t) [rad].
             authority: name of the input that scales the controller's command, 0 to 1 [-].
             offset: coordinate added to the reference [rad], such as a filtered setpoint.
-            start_tension: of the lifting rope [N]; None: that of a command without error.
+            start_tension: tension of the lifting rope [N]; None: that of a command without error.
         """
         d = self.device
         forces: list[Force] = [

@@ -1,4 +1,4 @@
-"""The arguments of an environment, and what is made of them."""
+"""The settings of an environment, and what is made of them."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ rtol 1e-6, in a third to a half more iterations."""
 DEFAULT_LOAD = {"uniform": [0.5, 2.0]}
 """Weight on the machine [kg]; assumed."""
 MOST_CYCLE = 100_000
+"""Largest number of different episodes that an environment remembers."""
 
 
 class EnvSettings(Settings):
@@ -46,7 +47,7 @@ class EnvSettings(Settings):
     control_rate: Any = Field(default=50.0, description="[Hz]")
     episode_duration: Any = Field(default=None, description="[s]")
     cycle: Any = Field(default=None, description="number of different episodes, after which the first comes again")
-    rtol: Any = Field(default=None, description="of the solver; None: that of the drive")
+    rtol: Any = Field(default=None, description="relative tolerance of the solver; None: that of the drive")
     render_mode: Literal["human", "rgb_array"] | None = None
 
 
@@ -60,7 +61,7 @@ def within(value: Any, low: float, high: float) -> bool:
 
 
 def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> None:
-    """Refuses what is no number between two limits.
+    """Refuse a value that is no number between two limits.
 
     Raises:
         InputError: names the argument and its value.
@@ -70,7 +71,7 @@ def check_number(name: str, value: Any, low: float, high: float, unit: str = "")
 
 
 def check_whole(name: str, value: Any, most: int) -> None:
-    """Refuses what is no whole number from 1 to `most`.
+    """Refuse a value that is no whole number from 1 to `most`.
 
     Raises:
         InputError: names the argument and its value.
@@ -80,10 +81,10 @@ def check_whole(name: str, value: Any, most: int) -> None:
 
 
 def control_steps(duration: float, rate: float) -> int:
-    """Control periods of an episode.
+    """Number of control periods in an episode.
 
     Raises:
-        InputError: there is not one.
+        InputError: the episode is shorter than one.
     """
     steps = round(duration * rate)
     if steps < 1:
@@ -95,18 +96,22 @@ def control_steps(duration: float, rate: float) -> int:
 
 
 def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:
-    """Distribution of the weight on the machine [kg]."""
+    """Distribution of the weight on the machine [kg].
+
+    Raises:
+        InputError: `load` is no number and no distribution of numbers that the machine takes.
+    """
     spec = DEFAULT_LOAD if load is None else load
     right = f"expected a number from {LEAST_LOAD} to {MOST_LOAD} kg, or a distribution of such numbers"
     try:
         if isinstance(spec, float) and not math.isfinite(spec):
             raise InputError(f"{right}.")
-        found = distribution(spec)
-        if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in found.limits()):
+        weights = distribution(spec)
+        if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in weights.limits()):
             raise InputError(f"{right}.")
     except InputError as error:
         raise InputError(f"load = {load!r}: {error}") from None
-    return found
+    return weights
 
 
 def worn_device(source: Any) -> Exoskeleton:

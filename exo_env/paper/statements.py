@@ -26,16 +26,16 @@ Numbers = Sequence[float]
 
 @dataclass(frozen=True)
 class Ordering:
-    """One statement."""
+    """One statement of the paper, as an order of numbers."""
 
     figure: str
     statement: str
     key: str
-    """Which number of the summaries."""
+    """Name of the number in the summaries."""
     scenarios: tuple[int, ...]
     holds: Callable[[Numbers], bool]
     why_not: str = ""
-    """Where it is false in our default system: the reason."""
+    """Reason for which it is false in our default system, where it is."""
 
 
 def _falling(x: Numbers) -> bool:
@@ -112,7 +112,7 @@ def judged(summaries: Sequence[dict[str, Any]], *, shipped: bool = True) -> list
     A statement on a muscle or a rope that the subject or the device does not have is left out.
 
     Args:
-        summaries: of the paper's scenarios 1 to 4, as exo_env.paper.summary gives them.
+        summaries: numbers of the paper's scenarios 1 to 4, as exo_env.paper.summary gives them.
         shipped: whether subject and device are the shipped ones, which the reasons for a false statement are about.
     """
     full = [_with_ratios(s) for s in summaries]

@@ -54,7 +54,7 @@ PROBE = 100.0
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of the procedure."""
+    """Result of the Ziegler-Nichols procedure."""
 
     critical: CriticalGain
     gains: Gains
@@ -97,7 +97,7 @@ class StepExperiment:
 
 
 def proportional(kp: float) -> Gains:
-    """Gains of the experiment."""
+    """Gains of the experiment, of a proportional controller."""
     return Gains(kp, 0.0, 0.0)
 
 

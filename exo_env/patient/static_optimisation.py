@@ -32,9 +32,9 @@ class ArmTable(NamedTuple):
     moving: np.ndarray
     """True for a point of the forearm, False for one of the ground, shape (n,)."""
     points: np.ndarray
-    """In the frame of the forearm or in ground axes [m], shape (n, 3)."""
+    """Points of the paths in the frame of the forearm or in ground axes [m], shape (n, 3)."""
     axis: np.ndarray
-    """Of the elbow [-], shape (3,)."""
+    """Axis of the elbow [-], shape (3,)."""
     elbow: np.ndarray
     """Centre of the elbow [m], shape (3,)."""
 
@@ -43,13 +43,13 @@ class LoadTable(NamedTuple):
     """What the forearm carries."""
 
     inertia: float
-    """Of the forearm about the elbow [kg m^2]."""
+    """Inertia of the forearm about the elbow [kg m^2]."""
     mass: float
-    """Of the forearm [kg]."""
+    """Mass of the forearm [kg]."""
     centre_of_mass: np.ndarray
-    """Of the forearm in its frame [m], shape (3,)."""
+    """Centre of mass of the forearm in its frame [m], shape (3,)."""
     grip: np.ndarray
-    """In the forearm's frame [m], shape (3,)."""
+    """Centre of the grip in the forearm's frame [m], shape (3,)."""
     handle: float
     """Mass of the handle [kg]."""
     weight: float
@@ -57,7 +57,7 @@ class LoadTable(NamedTuple):
     pulley: np.ndarray
     """Low pulley in ground axes [m], shape (3,)."""
     gravity: np.ndarray
-    """In ground axes [m/s^2], shape (3,)."""
+    """Gravity in ground axes [m/s^2], shape (3,)."""
 
 
 @compiled
@@ -284,8 +284,8 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
 
 
 @compiled
-def drawn(table, rows, interval, period, out):
-    """Linear interpolation of a table in time.
+def interpolated(table, rows, interval, period, out):
+    """Fill `out` by linear interpolation of a table in time.
 
     Args:
         table: values, shape (k, m).

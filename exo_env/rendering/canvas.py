@@ -25,7 +25,7 @@ DESIGN = 480.0
 FINER = 2
 """Fine pixels per pixel of the result, along a side: the averages smooth all edges."""
 FONT_HEIGHTS = {"small": 14, "normal": 16}
-"""Of the words, in lengths of the layout."""
+"""Heights of the words, in lengths of the layout."""
 PROMPT = "PYGAME_HIDE_SUPPORT_PROMPT"
 
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """What is drawn for an episode."""
+    """What is drawn at random for an episode."""
 
     key: int
-    """Of the random streams (streams.py), which the noise of the episode comes from."""
+    """Key of the random streams (streams.py), which the noise of the episode comes from."""
     patient: np.ndarray
     """Row of the patient, in the order of FIELDS."""
     load: float
@@ -37,16 +37,16 @@ class Draw:
     start: float
     """Elbow angle at the start [rad]."""
     phase: float
-    """Of the tremor [rad]."""
+    """Phase of the tremor at the start [rad]."""
 
 
 class Episode:
     """A patient in the device. World, model and effort are those of the present: another's after the next reset.
 
     Args:
-        world: in which it takes place.
-        draw: who and what was drawn.
-        need: of the patient on this movement.
+        world: world in which it takes place.
+        draw: what is drawn for it.
+        need: what the patient lacks on this movement.
     """
 
     def __init__(self, world: PatientWorld, draw: Draw, need: Need) -> None:
@@ -56,7 +56,7 @@ class Episode:
 
     @cached_property
     def patient(self) -> Patient:
-        """Who."""
+        """Who is in the device."""
         return Patient.of_row(self.draw.patient)
 
     @property
@@ -71,7 +71,7 @@ class Episode:
 
     @property
     def drive(self) -> Drive:
-        """From actions to commands."""
+        """Makes commands of actions."""
         return self._world.drive
 
     @property
@@ -81,7 +81,7 @@ class Episode:
 
     @property
     def world(self) -> World:
-        """What moves."""
+        """The simulation of dms_core that moves."""
         return self._world.dynamics
 
     @property
@@ -111,7 +111,7 @@ class Episode:
 
     @cached_property
     def arm(self) -> Arm:
-        """Of the patient."""
+        """The patient's arm."""
         return self.ecosystem.arm()
 
     @cached_property

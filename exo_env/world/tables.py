@@ -45,7 +45,7 @@ class DriveTables(NamedTuple):
     kernel: Kept
     """Address of the drive's kernel, shape (1,)."""
     numbers: Kept
-    """What the kernel reads beside the action."""
+    """Numbers of the drive that the kernel reads beside the action."""
     steps: Kept
     """Largest change of each command in a control period, shape (n_c,)."""
     start: Kept
@@ -57,12 +57,13 @@ class DriveTables(NamedTuple):
     axes: Kept
     """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
     action: Cleared
+    """The present action, shape (n_a,)."""
     before: Cleared
     """The action of the period before, shape (n_a,)."""
     wanted: Cleared
-    """What the kernel wants each command to be at the end of the period, shape (n_c,)."""
+    """What each command is to be at the end of the period, from the kernel, shape (n_c,)."""
     commands: Cleared
-    """Reached at the end of the last period, shape (n_c,)."""
+    """Commands that were reached at the end of the last period, shape (n_c,)."""
 
 
 class PatientTables(NamedTuple):
@@ -77,7 +78,7 @@ class PatientTables(NamedTuple):
     felt: Cleared
     """What the patient feels of the elbow, at the places of FELT."""
     senses: Kept
-    """Their places in y."""
+    """Places in y of the sensors that give it."""
     rows: Kept
     """Row of each excitation in the signals of the world, shape (m,)."""
 
@@ -92,7 +93,7 @@ class PlanTables(NamedTuple):
     starts: Kept
     """Starts of the pieces of psi in the signals of the world [s]."""
     coefficients: Kept
-    """Their coefficients, shape (n, 6)."""
+    """Coefficients of these pieces, shape (n, 6)."""
     course: Cleared
     """psi, its rate and its acceleration at each control time, shape (k, 3)."""
     horizons: Kept
@@ -117,17 +118,17 @@ class TaskTables(NamedTuple):
     source: Kept
     """Places in y of the sensors that readings copy."""
     target: Kept
-    """Their places in the readings."""
+    """Place in the readings of each of these."""
     shown: Kept
     """Place in the readings, and in a patient's row, of each trait that a reading shows, shape (k, 2)."""
     numbers: Kept
-    """Limits, and what else the kernels read."""
+    """Numbers of the task that the kernels read: its limits, and what else it has."""
     weights: Kept
     """Weight of each reward term."""
     readings: Cleared
     terms: Cleared
     reward: Cleared
-    """Shape (1,)."""
+    """Sum of the terms times their weights, shape (1,)."""
 
 
 class ObserverTables(NamedTuple):
@@ -135,7 +136,7 @@ class ObserverTables(NamedTuple):
 
     columns: Kept
     """Place of each component in the readings, shape (n,)."""
-    sensors: Kept
+    imperfections: Kept
     """Imperfections of each component, shape (n, 7); see tasks/noise.py."""
     streams: Kept
     """Random stream of each component's noise, as a signed number, shape (n,)."""
@@ -152,13 +153,13 @@ class DrawTables(NamedTuple):
     """What was drawn for the episode that a reset begins."""
 
     key: Kept
-    """Of the random streams, as a signed number, shape (1,)."""
+    """Key of the random streams (streams.py), as a signed number, shape (1,)."""
     patient: Kept
     """Row of the patient."""
     movement: Kept
     """Numbers of the movement."""
     given: Kept
-    """At the places of GIVEN."""
+    """Load, angle and phase of the start, at the places of GIVEN."""
 
 
 class ScalingTables(NamedTuple):
@@ -186,7 +187,7 @@ class SubjectTables(NamedTuple):
     first: Kept
     moving: Kept
     axis: Kept
-    """As in an ArmTable."""
+    """Muscles and their paths, as in an ArmTable."""
     gravity: Kept
     handle: Kept
     """Mass [kg], length [m], and distance of the centre of mass from the grip [m]."""
@@ -199,7 +200,7 @@ class SubjectTables(NamedTuple):
     rope: Kept
     """Ends of the rope that lifts, on upper and lower link [m], shape (2, 3)."""
     times: Kept
-    """At which the command is planned [s]."""
+    """Times at which the command is planned [s]."""
 
 
 class RestTables(NamedTuple):
