@@ -15,7 +15,7 @@ from dms_core.yaml_text import read_yaml
 
 
 class Settings(BaseModel):
-    """Base of all settings."""
+    """Base of all settings: frozen, and checked when they are made."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 

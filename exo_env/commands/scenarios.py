@@ -61,7 +61,7 @@ def scenarios(
     named = [{"name": name, **s} for name, s in zip(names, summaries, strict=True)]
     write_json(out / "scenarios.json", {"scenarios": named, "orderings": orderings})
     labels = [f"{k}: {s.title}" if of_the_paper else f"{names[k - 1]}: {s.title}" for k, s in enumerate(declared, 1)]
-    left_out = _drawn(out, runs, labels, ecosystem)
+    left_out = _draw(out, runs, labels, ecosystem)
     print("\n".join([*_table(named), "", *_statements(orderings, of_the_paper), *left_out, f"written: {out}"]))
     return 0
 
@@ -96,7 +96,7 @@ def _simulated(
     return runs
 
 
-def _drawn(out: Path, runs: list[ScenarioRun], labels: Sequence[str], ecosystem: Ecosystem) -> list[str]:
+def _draw(out: Path, runs: list[ScenarioRun], labels: Sequence[str], ecosystem: Ecosystem) -> list[str]:
     """Draw Figs. 6, 7, 9 to 13; gives a sentence on each that cannot be drawn."""
     from exo_env.paper.figures import scenario_figures
 

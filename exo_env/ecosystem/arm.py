@@ -45,7 +45,7 @@ TORSO_RADIUS = 0.17
 
 
 class Segment(NamedTuple):
-    """A scaled body."""
+    """A body of the arm, scaled to a person."""
 
     mass: float
     """Mass [kg]."""
@@ -62,7 +62,7 @@ class Arm:
     """The arm of a person: what the simulated subject is made of, and what a subject knows of itself.
 
     Args:
-        person: whom to scale the subject's anatomy to.
+        person: person to whom the subject's anatomy is scaled.
         subject: anatomy, a shipped one by name or a YAML file (subject.py).
     """
 

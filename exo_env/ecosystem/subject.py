@@ -27,7 +27,7 @@ SECTIONS = ("gravity", "roles", "grip", "bodies", "joints", "muscle_defaults", "
 
 @cache
 def subject_facts(source: str) -> dict[str, Any]:
-    """What a subject file holds, checked and read once.
+    """Contents of a subject's file, checked and read once.
 
     Args:
         source: name of a shipped subject, or path of a YAML file.
@@ -52,7 +52,7 @@ def subject_facts(source: str) -> dict[str, Any]:
 
 
 def _path(source: str) -> Path:
-    """File of a subject."""
+    """Path of the file of a subject."""
     if source.endswith((".yaml", ".yml")):
         return Path(source)
     shipped = sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
@@ -62,6 +62,6 @@ def _path(source: str) -> Path:
 
 
 def _check_role(path: Path, role: str, name: Any, known: Mapping[str, Any], section: str) -> None:
-    """Refuses a part that nothing in the file plays."""
+    """Refuse a role that nothing in the file has."""
     if name not in known:
         raise InputError(f"{path}: roles: {role} = {name!r}; expected one of the {section} {choices(known)}.")

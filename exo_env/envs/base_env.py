@@ -35,7 +35,7 @@ from exo_env.drives.drive import Drive, checked_action
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.envs.draw import Keys, checked_options, episode_of
+from exo_env.envs.draw import Keys, checked_options, episode_of, load_draws
 from exo_env.envs.settings import (
     MOST_CYCLE,
     SOLVER_OPTIONS,
@@ -113,6 +113,7 @@ class AssistanceEnv(gymnasium.Env):
         self.action_space = spaces.Box(-1.0, 1.0, (self.actions,), np.float32)
         self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
         self._weights = self.task.weights.model_dump()
+        self.load_draws = load_draws(self.load)
         self._options: dict[str, Any] = {}
         self._keys = Keys(s.cycle)
         self._episode: Episode | None = None

@@ -14,7 +14,7 @@ import numpy as np
 
 from dms_core.errors import InputError, choices
 from exo_env.envs.settings import load_distribution, within
-from exo_env.patient.distributions import Draws
+from exo_env.patient.distributions import Distribution, Draws
 from exo_env.patient.population import population
 from exo_env.streams import stream, uniform
 from exo_env.tasks.movement import START
@@ -70,6 +70,11 @@ def checked_options(options: Any) -> Mapping[str, Any]:
     return options or {}
 
 
+def load_draws(load: Distribution) -> Draws:
+    """Draws of the weight on the machine [kg]."""
+    return Draws({LOAD: load})
+
+
 def episode_of(env: AssistanceEnv, key: int, options: Mapping[str, Any]) -> Draw:
     """What is drawn for the episode of a key.
 
@@ -83,7 +88,7 @@ def episode_of(env: AssistanceEnv, key: int, options: Mapping[str, Any]) -> Draw
     """
     k = np.uint64(key)
     patients = population(options["patient"]) if "patient" in options else env.population
-    loads = load_distribution(options["load"]) if "load" in options else env.load
+    loads = load_draws(load_distribution(options["load"])) if "load" in options else env.load_draws
     movement = env.made_movement(options["reference"]) if "reference" in options else env.movement
     numbers = movement.draw(k, env.duration)
     start_deg = options.get("initial_angle_deg", numbers[movement.names.index(START)])
@@ -91,5 +96,4 @@ def episode_of(env: AssistanceEnv, key: int, options: Mapping[str, Any]) -> Draw
     if not within(start_deg, low, high):
         raise InputError(f"initial_angle_deg = {start_deg!r}: expected a number from {low:g} to {high:g}.")
     phase = 2.0 * math.pi * uniform(k, PHASE, 0)
-    load = float(Draws({LOAD: loads}).sample(k)[0])
-    return Draw(key, patients.draw(k), load, numbers, math.radians(start_deg), phase)
+    return Draw(key, patients.draw(k), float(loads.sample(k)[0]), numbers, math.radians(start_deg), phase)

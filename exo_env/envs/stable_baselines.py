@@ -48,11 +48,11 @@ class AssistanceVecEnv(VecEnv):
         return observations
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Remember the actions."""
+        """Keep the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """A control period of every world."""
+        """Do a control period of every world; see `VecEnv`."""
         assert self._actions is not None
         observations, rewards, terminated, truncated, stepped = self.worlds.step(self._actions)
         over = terminated | truncated
@@ -101,7 +101,7 @@ class AssistanceVecEnv(VecEnv):
         ]
 
     def env_is_wrapped(self, wrapper_class: type, indices: None | int | Iterable[int] = None) -> list[bool]:
-        """Worlds have no wrappers."""
+        """False for each world: worlds have no wrappers."""
         return [False for _ in self._get_indices(indices)]
 
 

@@ -31,8 +31,8 @@ class AssistanceVectorEnv(VectorEnv):
 
     Args:
         num_envs: number of worlds.
-        autoreset_mode: of gymnasium.vector.AutoresetMode: at the step after an episode's end (default), at the same
-            step, or never.
+        autoreset_mode: a gymnasium.vector.AutoresetMode: a new episode begins at the step after the last one's end
+            (default), at the same step, or at a call of `reset` only.
         threads: number of threads that step the worlds; None takes one for each core.
         settings: settings of the environment.
 
@@ -158,7 +158,7 @@ class AssistanceVectorEnv(VectorEnv):
         self._batch.take(i)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """A control period of every world.
+        """Do a control period of every world.
 
         Args:
             actions: shape (num_envs, n); beyond -1 to 1 they are clipped.

@@ -32,7 +32,7 @@ Curve = Callable[[ScenarioRun], np.ndarray]
 
 @dataclass(frozen=True)
 class Line:
-    """A run in the figures."""
+    """A run as a line in the figures."""
 
     run: ScenarioRun
     label: str
@@ -65,7 +65,7 @@ def _panels(count: int) -> tuple[Any, list[Any]]:
 
 
 def _draw(ax: Any, lines: Iterable[Line], curve: Curve) -> None:
-    """One curve a scenario."""
+    """Draw a curve for each scenario."""
     for line in lines:
         ax.plot(line.run.times, curve(line.run), label=line.label, **line.style)
 
@@ -148,7 +148,7 @@ def scenario_figures(folder: Path, runs: Sequence[ScenarioRun], labels: Sequence
 
     Args:
         folder: where the figures are written, under the same names as those of the paper.
-        runs: of the same exercise.
+        runs: simulated scenarios of the same exercise.
         labels: name of each run in the legend.
 
     Returns:

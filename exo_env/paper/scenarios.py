@@ -113,7 +113,7 @@ def load_scenarios() -> tuple[Exercise, list[Scenario]]:
 
 @dataclass(frozen=True)
 class ScenarioRun:
-    """A scenario that was simulated."""
+    """A scenario that was simulated, and what came of it."""
 
     scenario: Scenario
     exercise: Exercise
@@ -191,7 +191,7 @@ def run(
         scenario: how the exercise is shared.
         exercise: the movement.
         ecosystem: person, arm, device and machine; weight and proprioception are set here. Default: the paper's system.
-        options: of the solver.
+        options: options of the solver.
         progress: is called with the time reached [s].
 
     Raises:

@@ -95,7 +95,7 @@ class Population(Settings):
 
     @cached_property
     def parts(self) -> tuple[Population, ...]:
-        """The mixed populations."""
+        """Populations of a mixture, in the order of their weights."""
         return tuple(Population.shipped(name) for name in self.mixture)
 
     @cached_property

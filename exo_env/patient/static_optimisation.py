@@ -40,7 +40,7 @@ class ArmTable(NamedTuple):
 
 
 class LoadTable(NamedTuple):
-    """What the forearm carries."""
+    """Forearm, handle and weight, which the muscles carry."""
 
     inertia: float
     """Inertia of the forearm about the elbow [kg m^2]."""
@@ -249,7 +249,7 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
     Args:
         arm: an ArmTable.
         load: a LoadTable.
-        interval: between samples [s].
+        interval: time between samples [s].
         course: psi, its rate and its acceleration, shape (n, 3).
         sweeps: largest number of iterations.
         relaxation: share of a new tendon force that an iteration takes over; the first takes all.
@@ -290,9 +290,9 @@ def interpolated(table, rows, interval, period, out):
     Args:
         table: values, shape (k, m).
         rows: row that holds at each multiple of the interval, shape (n,).
-        interval: [s].
-        period: from one row of `out` to the next [s].
-        out: shape (p, m).
+        interval: time between two samples of the table [s].
+        period: time from one row of `out` to the next [s].
+        out: filled, shape (p, m).
     """
     last = rows.shape[0] - 1
     for k in range(out.shape[0]):

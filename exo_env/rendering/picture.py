@@ -70,7 +70,7 @@ def tension_share(tension: float) -> float:
 
 
 class View(NamedTuple):
-    """Maps metres to fine pixels."""
+    """A map from metres to fine pixels."""
 
     scale: float
     """[fine pixel/m]"""
@@ -130,7 +130,7 @@ class Picture:
         self.canvas.polygon(rounded(view(corners)), TORSO)
 
     def _arm(self, view: View, scene: Scene, upper_arm: float) -> None:
-        """Upper arm, forearm and hand."""
+        """Draw upper arm, forearm and hand."""
         r = view.scale * upper_arm
         shoulder, elbow, grip = view(scene.shoulder), view(scene.elbow), view(scene.grip)
         belly, wrist, knuckles = (elbow + share * (grip - elbow) for share in (0.24, 0.80, 0.94))

@@ -37,7 +37,7 @@ class Parts:
 
 @dataclass(frozen=True)
 class Reading:
-    """True numbers under a name."""
+    """One or several true numbers under a name."""
 
     name: str
     unit: str
@@ -59,7 +59,7 @@ class Imperfection(Settings):
 
 @dataclass(frozen=True)
 class Channel:
-    """How a reading is shown."""
+    """How a reading is shown to an agent."""
 
     name: str
     scale: float

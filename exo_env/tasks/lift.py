@@ -76,7 +76,7 @@ def _judge(w):
 
 
 class LiftTask(Task):
-    """Follow the reference, let the patient do what the patient can, end nothing early."""
+    """The task: follow the reference, and let the patient do what the patient can."""
 
     weights_type: ClassVar[type[Settings]] = Weights
     limits_type: ClassVar[type[Settings]] = Limits

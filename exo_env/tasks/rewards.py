@@ -41,7 +41,7 @@ REACTION_THRESHOLD, MOST = 500.0, 2.0
 
 
 class Weights(Settings):
-    """Factor on each term."""
+    """Weight of each reward term."""
 
     tracking: float = Field(default=1.0, ge=0.0, le=1e6)
     assistance: float = Field(default=0.75, ge=0.0, le=1e6)

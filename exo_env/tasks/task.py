@@ -114,7 +114,7 @@ class Task(ABC):
         return self.limits.numbers()  # type: ignore[attr-defined]
 
     def weight_numbers(self) -> np.ndarray:
-        """Weight of each term."""
+        """Weight of each reward term, in their order, shape (n,)."""
         return np.array([getattr(self.weights, name) for name in self.terms], dtype=float)
 
     def summary(self, structure: Sequence[Slice]) -> str:
@@ -139,7 +139,7 @@ class Task(ABC):
 
 @compiled
 def readings(w):
-    """All readings of a world."""
+    """All readings of a world, one component behind the other."""
     return floats(inner(w, WORLD.task), TASK.readings)
 
 

@@ -91,7 +91,7 @@ class Batch:
     Attributes:
         observations: float32, shape (size, observed).
         numbers: reward, terms and readings, shape (size, 1 + terms + len(reported)).
-        status: at the places of tables.STATUS, shape (size, 3).
+        status: numbers at the places of tables.STATUS, shape (size, 3).
     """
 
     def __init__(self, size: int, observed: int, terms: int, reported: np.ndarray, threads: int | None = None) -> None:

@@ -43,7 +43,7 @@ from exo_env.world.tables import (
 
 @compiled
 def effort_of(w):
-    """The patient's EffortState."""
+    """The `EffortState` of the patient."""
     e = inner(inner(w, WORLD.patient), PATIENT_TABLES.effort)
     return EffortState(
         floats(e, EFFORT.sign), floats(e, EFFORT.present), floats(e, EFFORT.active), floats(e, EFFORT.fatigued),

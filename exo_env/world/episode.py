@@ -56,7 +56,7 @@ class Episode:
 
     @cached_property
     def patient(self) -> Patient:
-        """Who is in the device."""
+        """The patient in the device."""
         return Patient.of_row(self.draw.patient)
 
     @property
@@ -71,7 +71,7 @@ class Episode:
 
     @property
     def drive(self) -> Drive:
-        """Makes commands of actions."""
+        """The drive, which makes commands of actions."""
         return self._world.drive
 
     @property
@@ -86,7 +86,7 @@ class Episode:
 
     @property
     def tables(self) -> WorldTables:
-        """The arrays of the present."""
+        """All arrays of the world, as they are now."""
         return self._world.tables
 
     @property

@@ -35,7 +35,7 @@ class Readout:
         return self.world.tables.task.readings[first : first + count].copy()
 
     def number(self, name: str) -> float:
-        """A reading of one component."""
+        """A reading of one component, by its name."""
         return float(self(name)[0])
 
     def sensor(self, name: str) -> float:

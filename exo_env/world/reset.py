@@ -75,7 +75,7 @@ there are no accelerations; joints stay open."""
 
 @compiled
 def arm_of(w):
-    """The patient's ArmTable."""
+    """The `ArmTable` of the patient."""
     s, x = inner(w, WORLD.subject), inner(w, WORLD.scaling)
     return ArmTable(
         matrix(x, SCALING.muscles), floats(s, SUBJECT.sign), ints(s, SUBJECT.first), flags(s, SUBJECT.moving),
@@ -85,7 +85,7 @@ def arm_of(w):
 
 @compiled
 def load_of(w, weight):
-    """The patient's LoadTable with a weight [kg]."""
+    """The `LoadTable` of the patient with a weight [kg]."""
     s, x = inner(w, WORLD.subject), floats(inner(w, WORLD.scaling), SCALING.forearm)
     return LoadTable(
         x[0], x[1], x[2:5], x[5:8], floats(s, SUBJECT.handle)[0], weight, floats(s, SUBJECT.low_pulley),

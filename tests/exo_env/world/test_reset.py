@@ -104,7 +104,11 @@ def test_the_command_is_that_of_the_internal_model(env):
 @pytest.mark.parametrize(
     ("code", "error", "sentence"),
     [
-        (UNSETTLED, SimulationError, "motor command does not settle: .* may still be wrong by 0.5; below 0.0001"),
+        (
+            UNSETTLED,
+            SimulationError,
+            "motor command does not settle: .* may still be wrong by 0.5, expected less than 0.0001",
+        ),
         (GAPING, SimulationError, "joints stay open by 0.25"),
     ],
 )
