@@ -37,11 +37,9 @@ from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.envs.draw import Keys, checked_options, episode_of, load_draws
 from exo_env.envs.settings import (
-    MOST_CYCLE,
     SOLVER_OPTIONS,
     EnvSettings,
-    check_number,
-    check_whole,
+    checked_settings,
     control_steps,
     load_distribution,
     worn_device,
@@ -83,18 +81,11 @@ class AssistanceEnv(gymnasium.Env):
 
     def __init__(self, **settings: Any) -> None:
         # What a caller does to a mapping afterwards must not reach into the environment.
-        self.settings = s = self._checked(copy.deepcopy(settings))
+        self.settings = s = checked_settings(self.settings_type, copy.deepcopy(settings))
         if s.render_mode is not None:
             from exo_env.rendering.canvas import import_pygame
 
             import_pygame()
-        check_number("control_rate", s.control_rate, 5.0, 1000.0, "Hz")
-        if s.episode_duration is not None:
-            check_number("episode_duration", s.episode_duration, 0.1, 120.0, "s")
-        if s.rtol is not None:
-            check_number("rtol", s.rtol, 1e-8, 0.2)
-        if s.cycle is not None:
-            check_whole("cycle", s.cycle, MOST_CYCLE)
         self.render_mode, self.period = s.render_mode, 1.0 / s.control_rate
         self.metadata = {**type(self).metadata, "render_fps": round(s.control_rate)}
         self.duration = float(s.episode_duration or self.usual_duration(s))
@@ -120,14 +111,6 @@ class AssistanceEnv(gymnasium.Env):
         self._readout: Readout | None = None
         self._over = False
         self._renderer: Any = None
-
-    @classmethod
-    def _checked(cls, settings: Mapping[str, Any]) -> EnvSettings:
-        known = cls.settings_type.model_fields
-        for name in settings:
-            if name not in known:
-                raise InputError(f"setting '{name}' is unknown; there are {choices(known)}.")
-        return cls.settings_type(**settings)
 
     def usual_duration(self, settings: EnvSettings) -> float:
         """Length of an episode where the settings name none [s]."""
@@ -195,8 +178,12 @@ class AssistanceEnv(gymnasium.Env):
             options: may fix 'patient' (whatever the constructor takes), 'load' [kg], 'reference' (numbers of the
                 movement) and 'initial_angle_deg' [deg]; nothing else changes by that.
 
+        Returns:
+            Observation and `info`, see `start_info`.
+
         Raises:
             InputError: an option is unknown or not usable.
+            SimulationError: the episode has no consistent start.
         """
         self.prepare(seed, options)
         self.begun(self.world.begin())

@@ -80,6 +80,30 @@ def check_whole(name: str, value: Any, most: int) -> None:
         raise InputError(f"{name} = {value!r}: expected a whole number from 1 to {most}.")
 
 
+def checked_settings(kind: type[EnvSettings], settings: Mapping[str, Any]) -> EnvSettings:
+    """Settings of an environment.
+
+    Args:
+        kind: class of the settings.
+        settings: what the user gives, by name.
+
+    Raises:
+        InputError: a setting is unknown or not usable.
+    """
+    for name in settings:
+        if name not in kind.model_fields:
+            raise InputError(f"setting '{name}' is unknown; there are {choices(kind.model_fields)}.")
+    s = kind(**settings)
+    check_number("control_rate", s.control_rate, 5.0, 1000.0, "Hz")
+    if s.episode_duration is not None:
+        check_number("episode_duration", s.episode_duration, 0.1, 120.0, "s")
+    if s.rtol is not None:
+        check_number("rtol", s.rtol, 1e-8, 0.2)
+    if s.cycle is not None:
+        check_whole("cycle", s.cycle, MOST_CYCLE)
+    return s
+
+
 def control_steps(duration: float, rate: float) -> int:
     """Number of control periods in an episode.
 

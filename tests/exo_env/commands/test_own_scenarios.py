@@ -120,7 +120,7 @@ def test_many_scenarios_have_lines_of_their_own(tmp_path):
         ("--scenarios", {**SCENARIO, "assistance": 2.0}, "wrong.yaml: Scenario: assistance = 2.0"),
         ("--scenarios", {**SCENARIO, "mass": 1.0}, "wrong.yaml: Scenario: unknown key 'mass'"),
         ("--exoskeleton", {"hinge_damping": 1.0}, "wrong.yaml: Exoskeleton: 'upper_link' is missing"),
-        ("--subject", {"gravity": [0.0, -9.8, 0.0]}, "wrong.yaml: the section 'roles' is missing"),
+        ("--subject", {"gravity": [0.0, -9.8, 0.0]}, "wrong.yaml: SubjectFacts: 'roles' is missing"),
     ],
 )
 def test_a_wrong_file_is_named_with_key_and_value(tmp_path, capsys, option, content, complaint):
