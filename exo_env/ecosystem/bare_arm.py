@@ -159,7 +159,7 @@ def table(trajectory: Trajectory, sample: float) -> dict[str, np.ndarray]:
 
 
 def warnings(trajectory: Trajectory) -> list[str]:
-    """What a reader of the run should know: an elbow outside the range of arm26, which has no joint stops."""
+    """Sentences of warning: on an elbow outside the range of arm26, which has no joint stops."""
     degrees = np.degrees(np.unwrap(trajectory.sensors()["elbow_angle.angle"]))
     low, high = degrees.min(), degrees.max()
     if low >= 0.0 and high <= HIGHEST_FLEXION_DEG:

@@ -32,7 +32,7 @@ REFERENCE, ASSISTANCE, REFLEX = "psi", "assistance", "proprioception"
 
 
 class Part(Protocol):
-    """What joins the system beside arm, device and machine."""
+    """A part of the system beside arm, device and machine."""
 
     def bodies(self, flexion: float) -> Sequence[RigidBody]:
         """Bodies of the part where the elbow rests at an angle [rad]."""

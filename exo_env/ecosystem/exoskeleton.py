@@ -71,7 +71,7 @@ class PidGains(Settings):
 
 
 class CriticalOscillation(Settings):
-    """What the gains follow from; documentation and Fig. 6, no part of the model."""
+    """The oscillation that the gains follow from; for Fig. 6 and for the reader, no part of the model."""
 
     Kc: float = Field(gt=0.0, description="critical gain [N/rad]")
     Tc: float = Field(gt=0.0, description="critical period [s]")
@@ -129,7 +129,10 @@ class Exoskeleton(Settings):
         return cls.from_config(f"exoskeletons/{source}.yaml")
 
     def changed(self, **changes: Any) -> Self:
-        """As `Settings.changed`; a rope may be changed by its name alone, as in files of version 0.1."""
+        """A checked copy with other values, see `Settings.changed`.
+
+        A rope may be changed by its name alone, as in files of version 0.1.
+        """
         by_name = {name: x for name, x in changes.items() if name in self.ropes}
         others = {name: x for name, x in changes.items() if name not in self.ropes}
         if by_name:

@@ -83,7 +83,7 @@ def handle_angle(axis, gravity, to_pulley, handle, weight):
 
 @compiled
 def clearances(elbow, grip, handle_length, low_pulley, room):
-    """What is left between the ends of the rope and the pulleys, above 0 where they cannot meet [m].
+    """Room between the ends of the rope and the pulleys, above 0 where they cannot meet [m].
 
     The handle's end goes as far as grip and handle reach from the elbow; the weight, which begins `room` [m] below the
     high pulley, can rise by twice that.

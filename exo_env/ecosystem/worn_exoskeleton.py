@@ -77,7 +77,7 @@ class WornExoskeleton:
         """Whether the hinge axis is that of the elbow."""
         self.axes = axes
         self.shift = axes @ np.array(misalignment.shift)
-        """From the elbow centre to the hinge, in ground axes [m]."""
+        """Vector from the elbow centre to the hinge, in ground axes [m]."""
         self.orientation = quaternion_product(_orientation(axes), tilt)
         self.origin = arm.elbow + self.shift
 

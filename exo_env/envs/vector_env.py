@@ -98,7 +98,16 @@ class AssistanceVectorEnv(VectorEnv):
     def reset_each(
         self, seeds: Sequence[int | None], options: Sequence[dict[str, Any]], mask: np.ndarray | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """As `reset`, with a seed and options for each world, shape (num_envs,); `mask`: those that are reset."""
+        """Reset worlds with a seed and options for each, see `reset`.
+
+        Args:
+            seeds: seed of each world, None to go on, shape (num_envs,).
+            options: options of each world, shape (num_envs,).
+            mask: which worlds are reset, shape (num_envs,); None: all.
+
+        Raises:
+            InputError: an option is not usable.
+        """
         where = np.ones(self.num_envs, bool) if mask is None else mask
         # A reset that fails half-way leaves nothing to step.
         self._over[where], self._started = True, False

@@ -56,7 +56,7 @@ class Exercise(Settings):
 
     @model_validator(mode="after")
     def _possible(self):
-        """Refuses knots that no elbow can follow."""
+        """Refuse knots that no elbow can follow."""
         times, angles, limits = list(self.times), list(self.angles_deg), Limits()
         if len(angles) != len(times):
             raise ValueError(f"angles_deg = {angles}: expected {len(times)} angles, one for each of the times")

@@ -71,7 +71,7 @@ def voluntary_moment(patient: Patient, known: InternalModel, angle: float = MIDD
 
 
 def ability(patient: Patient, known: InternalModel) -> float:
-    """What the patient can hold of arm and load, from 0 to 1 [-].
+    """Share of arm and load that the patient can hold, from 0 to 1 [-].
 
     Args:
         patient: the patient.

@@ -135,7 +135,7 @@ def wanted_share(par, state, period, k):
 
 @compiled
 def voluntary_drive(par, state, k, share):
-    """What weakness and fatigue leave of a wanted share [-]."""
+    """Voluntary drive: the part of a wanted share that weakness and fatigue leave [-]."""
     return largest_activation(par, state.sign[k]) * min(share, 1.0 - state.fatigued[k])
 
 

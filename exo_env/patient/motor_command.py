@@ -124,7 +124,7 @@ def arm_table(arm: Arm) -> ArmTable:
 
 
 def load_table(arm: Arm, machine: GymMachine, expected_load: float) -> LoadTable:
-    """What the arm carries, for the compiled iteration."""
+    """The load of the arm, for the compiled iteration."""
     forearm, handle = arm.segments["forearm"], machine.handle
     return LoadTable(
         inertia=arm.inertia_about_elbow(),

@@ -219,7 +219,7 @@ def population(source: Source) -> Population:
 
 
 def read_shipped(name: str) -> Mapping[str, Any]:
-    """What the file of a shipped population holds."""
+    """Contents of the file of a shipped population."""
     return read_yaml(configs() / FOLDER / f"{name}.yaml")
 
 

@@ -73,7 +73,7 @@ class View(NamedTuple):
     """A map from metres to fine pixels."""
 
     scale: float
-    """[fine pixel/m]"""
+    """Scale of the picture [fine pixel/m]."""
     x: float
     """Place of the left edge of the canvas [m]."""
     y: float

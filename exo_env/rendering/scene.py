@@ -56,4 +56,4 @@ class Scene:
     pulleys: tuple[np.ndarray, ...] = ()
     """Pulleys of the gym machine [m], each of shape (2,)."""
     gym_rope: np.ndarray | None = None
-    """From the grip over the end of the handle and the pulleys to the weight [m], shape (n, 2), n >= 3."""
+    """Gym rope from the grip over the end of the handle and the pulleys to the weight [m], shape (n, 2), n >= 3."""

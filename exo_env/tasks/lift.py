@@ -97,7 +97,7 @@ class LiftTask(Task):
         return lift_readings(parts)
 
     def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
-        """What a device can measure with the reference beside it, EMG, and what only a simulation knows."""
+        """Three groups: what a device measures, with the reference; EMG; and what only a simulation knows."""
         reference = [
             Channel("reference", 1.0, -0.5, 3.0),
             Channel("reference_rate", 1.0, -20.0, 20.0),

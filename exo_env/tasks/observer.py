@@ -18,7 +18,7 @@ from exo_env.tasks.noise import IMPERFECTION
 
 
 class Observer:
-    """Turns true readings into observations.
+    """The channels of an observation and their imperfections.
 
     Args:
         observation: names of groups, or of single channels as "group.channel".

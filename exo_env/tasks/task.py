@@ -110,7 +110,7 @@ class Task(ABC):
         return tuple(type(self.weights).model_fields)
 
     def numbers(self) -> np.ndarray:
-        """What the kernels read beside the readings: here those of the limits."""
+        """Numbers that the kernels read beside the readings: here those of the limits, shape (n,)."""
         return self.limits.numbers()  # type: ignore[attr-defined]
 
     def weight_numbers(self) -> np.ndarray:

@@ -101,7 +101,7 @@ class Episode:
 
     @property
     def effort(self) -> float:
-        """What the patient intends, as a multiple of what was planned: s [-]."""
+        """Effort s of the patient, as a multiple of the planned command [-]."""
         return float(self.tables.patient.effort.present[PRESENT.effort])
 
     @cached_property

@@ -31,8 +31,11 @@ class DynamicsTables(NamedTuple):
     """The differential-algebraic system and its sensors."""
 
     model: Packed
+    """Tables of the equations (dms_core)."""
     state: Packed
+    """Arrays of the simulation (dms_core)."""
     sensing: Packed
+    """Tables of the sensors (dms_core)."""
     options: Kept
     """Options of the solver, in the order of `Options`."""
     y: Cleared
@@ -67,14 +70,16 @@ class DriveTables(NamedTuple):
 
 
 class PatientTables(NamedTuple):
-    """Who is in the device; m muscles, k control times."""
+    """The patient in the device; m muscles, k control times."""
 
     traits: Cleared
     """Numbers of the patient, at the places of PATIENT."""
     effort: EffortState
+    """Effort, fatigue and the memories of delayed signals."""
     wanted: Cleared
     """Motor command at each control time, shape (k, m)."""
     excitations: Cleared
+    """Excitation of each muscle at the end of the last period [-], shape (m,)."""
     felt: Cleared
     """What the patient feels of the elbow, at the places of FELT."""
     senses: Kept
@@ -84,7 +89,7 @@ class PatientTables(NamedTuple):
 
 
 class PlanTables(NamedTuple):
-    """What the patient intends to do, and what that needs."""
+    """The movement that the patient intends, and the moment that it needs; k control times."""
 
     kernel: Kept
     """Address of the movement's kernel, shape (1,)."""
@@ -107,7 +112,7 @@ class PlanTables(NamedTuple):
 
 
 class TaskTables(NamedTuple):
-    """What is read, rewarded and ended; see tasks/task.py."""
+    """Readings, reward terms and limits of the task; see tasks/task.py."""
 
     read: Kept
     """Address of the kernel `read`, shape (1,)."""
@@ -126,13 +131,15 @@ class TaskTables(NamedTuple):
     weights: Kept
     """Weight of each reward term."""
     readings: Cleared
+    """Components of all readings, one behind the other."""
     terms: Cleared
+    """Value of each reward term, shape (n,)."""
     reward: Cleared
     """Sum of the terms times their weights, shape (1,)."""
 
 
 class ObserverTables(NamedTuple):
-    """What is observed, and how well; n components, k control times."""
+    """The observation and its imperfections; n components, k control times."""
 
     columns: Kept
     """Place of each component in the readings, shape (n,)."""
@@ -147,10 +154,11 @@ class ObserverTables(NamedTuple):
     memory: Cleared
     """Past readings, newest first, shape (depth, n)."""
     observation: Cleared
+    """The observation, in the scales of the channels, shape (n,)."""
 
 
 class DrawTables(NamedTuple):
-    """What was drawn for the episode that a reset begins."""
+    """The draw of the episode that a reset begins."""
 
     key: Kept
     """Key of the random streams (streams.py), as a signed number, shape (1,)."""
@@ -163,7 +171,7 @@ class DrawTables(NamedTuple):
 
 
 class ScalingTables(NamedTuple):
-    """How the numbers of a world follow from a patient's sizes; see scaling.py."""
+    """Numbers of the world that follow from a patient's sizes; see scaling.py."""
 
     coefficients: Kept
     """C for men, then for women, shape (2 n, monomials)."""
@@ -174,14 +182,17 @@ class ScalingTables(NamedTuple):
     targets: Kept
     """Where the model's numbers lie: a table as of arena.py, shape (k, 3)."""
     start: Kept
+    """Coordinates at the start; true only for what does not move, shape (n_q,)."""
     muscles: Kept
     points: Kept
     elbow: Kept
+    """Muscles, points of their paths, and centre of the elbow, as in an ArmTable."""
     forearm: Kept
+    """Inertia about the elbow, mass, centre of mass and grip, as in a LoadTable, shape (8,)."""
 
 
 class SubjectTables(NamedTuple):
-    """What of an arm and its load is the same for all patients; the rest is in ScalingTables."""
+    """Numbers of arm and load that are the same for all patients; the others are in ScalingTables."""
 
     sign: Kept
     first: Kept
@@ -189,10 +200,12 @@ class SubjectTables(NamedTuple):
     axis: Kept
     """Muscles and their paths, as in an ArmTable."""
     gravity: Kept
+    """Gravity in ground axes [m/s^2], shape (3,)."""
     handle: Kept
     """Mass [kg], length [m], and distance of the centre of mass from the grip [m]."""
     low_pulley: Kept
     high_pulley: Kept
+    """Pulleys of the gym machine in ground axes [m], each of shape (3,)."""
     weight_height: Kept
     """Height of the weight at the start [m], shape (1,)."""
     link: Kept
@@ -204,14 +217,14 @@ class SubjectTables(NamedTuple):
 
 
 class RestTables(NamedTuple):
-    """Where the world is at rest; see rest_pose.py."""
+    """Numbers of the world at rest; see rest_pose.py."""
 
     orientation: Kept
     """Euler parameters of both links where the hinge is at 0, shape (4,)."""
     misaligned: Kept
     """1 where the hinge axis is not that of the elbow, or 0, shape (1,)."""
     shift: Kept
-    """From the elbow centre to the hinge, in ground axes [m]."""
+    """Vector from the elbow centre to the hinge, in ground axes [m], shape (3,)."""
     guided: Kept
     """Point that the guide leads, in the forearm's frame [m]."""
     link_centre: Kept
@@ -244,7 +257,9 @@ class WorldTables(NamedTuple):
     cleared: Kept
     """Address and number of 8-byte words of every array that a reset sets to zero, shape (n, 2)."""
     status: Cleared
+    """Progress of the episode, at the places of STATUS."""
     outcome: Cleared
+    """Results of the last reset, at the places of OUTCOME."""
 
 
 DYNAMICS, DRIVE, PATIENT_TABLES, PLAN, TASK, OBSERVER, DRAW, SCALING, SUBJECT, REST, WORLD, EFFORT = map(
