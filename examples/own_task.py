@@ -13,7 +13,7 @@ from exo_env.settings import Settings
 from exo_env.tasks.channels import Parts
 from exo_env.tasks.elbow import ELBOW, action_channel, device_channels, elbow_readings, read_elbow
 from exo_env.tasks.movement import Stay
-from exo_env.tasks.task import Task, Told
+from exo_env.tasks.task import Reported, Task
 
 TARGET = math.radians(60.0)
 
@@ -40,7 +40,7 @@ def judge(w):
 class HoldAtSixty(Task):
     weights_type, limits_type, movement_type = Weights, NoLimits, Stay
     events: ClassVar = ()
-    told: ClassVar = (Told("angle_deg", "angle", 180.0 / math.pi),)
+    reported: ClassVar = (Reported("angle_deg", "angle", 180.0 / math.pi),)
     read, judge = read_elbow, judge
 
     def declared_readings(self, parts: Parts):

@@ -27,21 +27,22 @@ def cleared_areas(values: Any) -> np.ndarray:
 
 
 def _areas(values: Any) -> list[tuple[int, int]]:
-    found: list[tuple[int, int]] = []
+    """Address and number of words of each array that a reset clears."""
+    areas: list[tuple[int, int]] = []
     hints = get_type_hints(type(values), include_extras=True)
     for name, value in zip(values._fields, values, strict=True):
         where = f"{type(values).__name__}.{name}"
         if isinstance(value, Packed):
             continue
         if isinstance(value, tuple):
-            found += _areas(value)
+            areas += _areas(value)
         elif hints[name] == Cleared:
             if value.itemsize != 8:
                 raise TypeError(f"{where}: expected numbers of 8 bytes, got {value.dtype}.")
-            found.append((value.ctypes.data, value.size))
+            areas.append((value.ctypes.data, value.size))
         elif hints[name] != Kept:
             raise TypeError(f"{where}: declare it as Kept or as Cleared (exo_env/clearing.py).")
-    return found
+    return areas
 
 
 @compiled

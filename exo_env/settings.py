@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -14,7 +15,7 @@ from dms_core.yaml_text import read_yaml
 
 
 class Settings(BaseModel):
-    """Base of all settings."""
+    """Base of all settings: frozen, and checked when they are made."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -25,7 +26,7 @@ class Settings(BaseModel):
             raise InputError(explain(type(self), data, error)) from None
 
     def __hash__(self) -> int:
-        """Of the class and all values, which may be mappings too."""
+        """Hash of the class and of all values, which may be mappings too."""
         return hash((type(self), self.model_dump_json()))
 
     @classmethod
@@ -35,11 +36,19 @@ class Settings(BaseModel):
         Raises:
             InputError: the file is missing or wrong; names file, key and value.
         """
-        path = config_file(name)
+        return cls.from_file(config_file(name))
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Self:
+        """These settings from a YAML file.
+
+        Raises:
+            InputError: the file is missing or wrong; names file, key and value.
+        """
         try:
             return cls(**read_yaml(path))
         except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+            raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
     def changed(self, **changes: Any) -> Self:
         """A checked copy with other values; a mapping given for settings within these changes only what it names.

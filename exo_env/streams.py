@@ -32,7 +32,7 @@ def stream(name: str) -> np.uint64:
 
 
 def streams(names: Iterable[str]) -> np.ndarray:
-    """As `stream`, of several names, shape (n,)."""
+    """Numbers of several streams, see `stream`, shape (n,)."""
     return np.array([stream(name) for name in names], np.uint64)
 
 

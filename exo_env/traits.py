@@ -49,6 +49,7 @@ def trait(
 
 
 def _declared(field: FieldInfo, key: str) -> Any:
+    """A declaration of a trait by its key; None for a field that is no trait."""
     extra = field.json_schema_extra
     return extra.get(key) if isinstance(extra, dict) else None
 

@@ -34,7 +34,7 @@ class Command:
     """An input of the model that a drive sets."""
 
     name: str
-    """Of the input."""
+    """Name of the input."""
     rate: float
     """Largest change [unit of the command per s]; may be infinite."""
     start: float = 0.0
@@ -57,11 +57,11 @@ class Drive(Settings):
         raise NotImplementedError
 
     def commands(self, device: Exoskeleton) -> tuple[Command, ...]:
-        """What the drive sets, in the order of the kernel's output."""
+        """Commands that the drive sets, in the order of the kernel's output."""
         raise NotImplementedError
 
     def numbers(self, device: Exoskeleton) -> np.ndarray:
-        """What the kernel reads beside the action."""
+        """Numbers that the kernel reads beside the action."""
         raise NotImplementedError
 
     def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:

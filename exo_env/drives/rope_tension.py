@@ -62,7 +62,7 @@ class RopeTension(Drive):
         return dict(zip(device.ropes, self.max_tension, strict=True))
 
     def actions(self, device: Exoskeleton) -> tuple[str, ...]:
-        """A tension for each rope."""
+        """The tension of each rope."""
         return tuple(f"{rope} tension" for rope in self._largest(device))
 
     def commands(self, device: Exoskeleton) -> tuple[Command, ...]:

@@ -45,16 +45,16 @@ TORSO_RADIUS = 0.17
 
 
 class Segment(NamedTuple):
-    """A scaled body."""
+    """A body of the arm, scaled to a person."""
 
     mass: float
-    """[kg]"""
+    """Mass [kg]."""
     centre_of_mass: np.ndarray
-    """In its frame [m]."""
+    """Centre of mass in the body's frame [m]."""
     inertia: np.ndarray
-    """Principal, about the centre of mass, in its frame [kg m^2]."""
+    """Principal moments about the centre of mass, in the body's frame [kg m^2]."""
     origin: np.ndarray
-    """Origin of its frame in ground axes [m]; the forearm's is the elbow centre."""
+    """Origin of the body's frame in ground axes [m]; the forearm's is the elbow centre."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Arm:
     """The arm of a person: what the simulated subject is made of, and what a subject knows of itself.
 
     Args:
-        person: whom to scale the subject's anatomy to.
+        person: person to whom the subject's anatomy is scaled.
         subject: anatomy, a shipped one by name or a YAML file (subject.py).
     """
 
@@ -71,7 +71,7 @@ class Arm:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """The file of the subject."""
+        """Contents of the subject's file."""
         return subject_facts(self.subject)
 
     @property
@@ -87,17 +87,17 @@ class Arm:
 
     @property
     def gravity(self) -> Vector:
-        """In ground axes [m/s^2]."""
+        """Gravity in ground axes [m/s^2]."""
         x, y, z = self.facts["gravity"]
         return (x, y, z)
 
     def length_factor(self, body: str) -> float:
-        """k of a segment [-]."""
+        """Length factor k of a segment [-]."""
         by_sex = LENGTH_FRACTION[self.person.sex][body] / LENGTH_FRACTION["male"][body]
         return self.person.height / HEIGHT_0 * by_sex
 
     def mass_factor(self, body: str) -> float:
-        """m / m_0 of a segment [-]."""
+        """Mass factor m / m_0 of a segment [-]."""
         by_sex = MASS_FRACTION[self.person.sex][body] / MASS_FRACTION["male"][body]
         return self.person.body_mass / MASS_0 * by_sex
 
@@ -139,7 +139,7 @@ class Arm:
         return self.length_factor("forearm") * np.array(self.facts["grip"])
 
     def rotation(self, flexion: float) -> np.ndarray:
-        """A of the forearm at an elbow angle [rad], shape (3, 3)."""
+        """Rotation matrix A of the forearm at an elbow angle [rad], shape (3, 3)."""
         return rotation_matrix(quaternion(self.axis, flexion))
 
     def bodies(self, flexion: float) -> list[RigidBody]:
@@ -183,7 +183,7 @@ class Arm:
 
     @cached_property
     def _paths(self) -> dict[tuple[str, bool], tuple[PathPoint, ...]]:
-        """Of the muscles asked for so far."""
+        """Paths of the muscles that were asked for so far."""
         return {}
 
     def _path(self, muscle: str, welded: bool) -> tuple[PathPoint, ...]:
@@ -212,7 +212,7 @@ class Arm:
 
     @cached_property
     def _muscles(self) -> dict[str, ThelenMuscle]:
-        """Those asked for so far, as they are."""
+        """Muscles that were asked for so far, without changes."""
         return {}
 
     def _muscle(self, name: str, more: dict[str, Any]) -> ThelenMuscle:

@@ -42,9 +42,9 @@ def bare_arm(
 
     Args:
         start: elbow angle [rad].
-        excitations: course of each muscle's excitation [-].
-        start_activation: of every muscle [-].
-        arm: whose arm; default: arm26.
+        excitations: excitation of each muscle over time [-].
+        start_activation: activation of every muscle at the start [-].
+        arm: arm of a person; default: arm26.
     """
     arm = arm or Arm()
     forearm = next(body for body in arm.bodies(start) if body.name == "forearm")
@@ -107,22 +107,22 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
 
 
 def _check_header(path: Path, header: list[str]) -> None:
-    """Exactly the wanted columns, in any order."""
-    wanted = {TIME, *Arm().muscles}
+    """Refuse a table without exactly the expected columns, in any order."""
+    expected = {TIME, *Arm().muscles}
     if len(header) == 1 and ";" in header[0]:
         raise InputError(f"excitations '{path}': the columns are separated by semicolons; separate them by commas.")
     for name in header:
-        if name not in wanted:
-            raise InputError(f"excitations '{path}': unknown column '{name}'. Wanted: {choices(wanted)}.")
+        if name not in expected:
+            raise InputError(f"excitations '{path}': unknown column '{name}'. Expected {choices(expected)}.")
         if header.count(name) > 1:
             raise InputError(f"excitations '{path}': the column '{name}' stands twice.")
-    missing = wanted - set(header)
+    missing = expected - set(header)
     if missing:
         raise InputError(f"excitations '{path}': missing columns: {choices(missing)}.")
 
 
 def _has_cells(path: Path, line: int, cells: list[str], header: list[str]) -> bool:
-    """False for an empty line; a line of another length is an error."""
+    """Whether a line has cells; refuses a line of another length than the header."""
     if not any(cell.strip() for cell in cells):
         return False
     if len(cells) != len(header):
@@ -159,7 +159,7 @@ def table(trajectory: Trajectory, sample: float) -> dict[str, np.ndarray]:
 
 
 def warnings(trajectory: Trajectory) -> list[str]:
-    """What a reader of the run should know: an elbow outside the range of arm26, which has no joint stops."""
+    """Sentences of warning: on an elbow outside the range of arm26, which has no joint stops."""
     degrees = np.degrees(np.unwrap(trajectory.sensors()["elbow_angle.angle"]))
     low, high = degrees.min(), degrees.max()
     if low >= 0.0 and high <= HIGHEST_FLEXION_DEG:

@@ -19,6 +19,7 @@ from dms_core.model.element import Constraint, Force
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.signals import AnySignal
 from exo_env.ecosystem.arm import ELBOW, Arm, excitation_name
+from exo_env.ecosystem.exoskeleton import DEFAULT as DEFAULT_DEVICE
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine, LoadedMachine
 from exo_env.ecosystem.person import Person
@@ -31,16 +32,16 @@ REFERENCE, ASSISTANCE, REFLEX = "psi", "assistance", "proprioception"
 
 
 class Part(Protocol):
-    """What joins the system beside arm, device and machine."""
+    """A part of the system beside arm, device and machine."""
 
     def bodies(self, flexion: float) -> Sequence[RigidBody]:
-        """Its bodies where the elbow rests at an angle [rad]."""
+        """Bodies of the part where the elbow rests at an angle [rad]."""
 
     def joints(self) -> Sequence[Constraint]:
-        """What holds them."""
+        """Joints that hold these bodies."""
 
     def forces(self) -> Sequence[Force]:
-        """What acts on them, or on the bodies of arm, device and machine."""
+        """Forces on these bodies, or on those of arm, device and machine."""
 
 
 class Proprioception(Settings):
@@ -53,11 +54,11 @@ class Proprioception(Settings):
 
 
 class Ecosystem(Settings):
-    """What is joined. The defaults are the paper's system with arm26 and one kilogram."""
+    """Person, device and machine that are joined. The defaults are the paper's system with arm26 and one kilogram."""
 
     person: Person = Person()
     subject: str = Field(default=DEFAULT, description="anatomy: a shipped subject by name, or a YAML file")
-    device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.from_config("exoskeletons/elbow.yaml"))
+    device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.named(DEFAULT_DEVICE))
     machine: GymMachine | None = Field(
         default_factory=lambda: GymMachine.from_config("gym_machine/pulley.yaml"), description="None: the hand is empty"
     )
@@ -109,11 +110,11 @@ class Ecosystem(Settings):
 
         Args:
             start: elbow angle [rad].
-            reference: course of psi [rad].
-            excitations: course of each muscle's excitation [-]; a muscle that is not named stays at its minimum.
+            reference: psi over time [rad].
+            excitations: excitation of each muscle over time [-]; a muscle that is not named stays at its minimum.
             assistance: authority of the controller, 0 to 1 [-].
             start_activation: activation of each muscle at the start [-]; default: the minimum.
-            start_tension: of the rope that lifts [N]; default: that of a command without error.
+            start_tension: tension of the rope that lifts [N]; default: that of a command without error.
             muscle_times: activation and deactivation time constants of every muscle, as fields of ThelenMuscle [s].
             device_forces: controller, motors and ropes of the worn device; default: its own PID on all ropes.
             device_inputs: inputs that these read beside the reference; default: the authority.

@@ -15,12 +15,15 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from dms_core.errors import choices
+from dms_core.config_files import configs
+from dms_core.errors import InputError, choices
 from dms_core.model.element import Vector
 from dms_core.model.geometry.rotations import dot, sub
 from exo_env.jit import compiled
 from exo_env.settings import Settings
 
+DEFAULT = "elbow"
+"""Name of the shipped device that is worn unless another is named."""
 TWO_ROPES = {"agonist": "flexion", "antagonist": "extension"}
 """Ropes of a device file of version 0.1, and which way each turns the elbow."""
 
@@ -68,7 +71,7 @@ class PidGains(Settings):
 
 
 class CriticalOscillation(Settings):
-    """What the gains follow from; documentation and Fig. 6, no part of the model."""
+    """The oscillation that the gains follow from; for Fig. 6 and for the reader, no part of the model."""
 
     Kc: float = Field(gt=0.0, description="critical gain [N/rad]")
     Tc: float = Field(gt=0.0, description="critical period [s]")
@@ -103,8 +106,33 @@ class Exoskeleton(Settings):
             raise ValueError(f"ropes {choices(self.ropes)} all pull into extension; expected one that flexes the elbow")
         return self
 
+    @classmethod
+    def named(cls, source: str) -> Self:
+        """A shipped device by its name, or one from a YAML file.
+
+        Args:
+            source: name of a file in configs/exoskeletons without its ending, or path of a YAML file;
+                configs/exoskeletons/elbow.yaml shows every key.
+
+        Raises:
+            InputError: there is no such device, or its file is wrong; names file, key and value.
+
+        Example:
+            >>> Exoskeleton.named("elbow").lifting_rope
+            'agonist'
+        """
+        if source.endswith((".yaml", ".yml")):
+            return cls.from_file(source)
+        shipped = shipped_devices()
+        if source not in shipped:
+            raise InputError(f"exoskeleton = {source!r}: expected one of {choices(shipped)}, or a YAML file.")
+        return cls.from_config(f"exoskeletons/{source}.yaml")
+
     def changed(self, **changes: Any) -> Self:
-        """As `Settings.changed`; a rope may be changed by its name alone, as in files of version 0.1."""
+        """A checked copy with other values, see `Settings.changed`.
+
+        A rope may be changed by its name alone, as in files of version 0.1.
+        """
         by_name = {name: x for name, x in changes.items() if name in self.ropes}
         others = {name: x for name, x in changes.items() if name not in self.ropes}
         if by_name:
@@ -129,6 +157,11 @@ class Exoskeleton(Settings):
     def own_moment(self, angle: float, gravity: float) -> float:
         """Moment that holds the lower link at a hinge angle [rad] [Nm]; gravity in m/s^2."""
         return link_moment(self.lower_link.numbers(), angle, gravity)
+
+
+def shipped_devices() -> list[str]:
+    """Names of the devices in configs/exoskeletons."""
+    return sorted(path.stem for path in (configs() / "exoskeletons").glob("*.yaml"))
 
 
 @compiled

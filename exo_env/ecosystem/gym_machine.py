@@ -62,10 +62,10 @@ def handle_angle(axis, gravity, to_pulley, handle, weight):
     The rope pulls with the weight's force, the handle has its own, and the grip turns freely.
 
     Args:
-        axis: of the elbow, a triple.
-        gravity: a triple [m/s^2].
-        to_pulley: from the grip to the low pulley, a triple [m].
-        handle: mass [kg], length [m], distance of the centre of mass from the grip [m].
+        axis: axis of the elbow, a triple.
+        gravity: gravity, a triple [m/s^2].
+        to_pulley: vector from the grip to the low pulley, a triple [m].
+        handle: its mass [kg], its length [m], distance of the centre of mass from the grip [m].
         weight: mass on the rope [kg].
     """
     about = math.atan2(to_pulley[0], -to_pulley[1])
@@ -83,7 +83,7 @@ def handle_angle(axis, gravity, to_pulley, handle, weight):
 
 @compiled
 def clearances(elbow, grip, handle_length, low_pulley, room):
-    """What is left between the ends of the rope and the pulleys, above 0 where they cannot meet [m].
+    """Room between the ends of the rope and the pulleys, above 0 where they cannot meet [m].
 
     The handle's end goes as far as grip and handle reach from the elbow; the weight, which begins `room` [m] below the
     high pulley, can rise by twice that.
@@ -96,12 +96,12 @@ def clearances(elbow, grip, handle_length, low_pulley, room):
 
 
 def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> None:
-    """Refuses a machine whose rope an arm could bring to a pulley: its length has a kink there.
+    """Refuse a machine whose rope an arm could bring to a pulley: its length has a kink there.
 
     Args:
         machine: the machine.
         elbow: centre of the elbow in ground axes [m].
-        grip: in the forearm's frame [m].
+        grip: centre of the grip in the forearm's frame [m].
 
     Raises:
         InputError: an end of the rope could reach a pulley, and nothing stops the weight.
@@ -111,7 +111,7 @@ def check_reach(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> Non
 
 
 def reach_error(machine: GymMachine, elbow: np.ndarray, grip: np.ndarray) -> InputError:
-    """What `check_reach` raises, about the pulley that is nearer to being reached."""
+    """The error of `check_reach`, about the pulley that is nearer to being reached."""
     low, high, reach = _clearances(machine, elbow, grip)
     if high < low:
         return InputError(
@@ -134,8 +134,8 @@ class LoadedMachine:
 
     Args:
         machine: the machine.
-        arm: whose hand holds the handle.
-        mass: of the weight [kg].
+        arm: arm whose hand holds the handle.
+        mass: mass of the weight [kg].
 
     Raises:
         InputError: see check_reach.

@@ -26,9 +26,9 @@ def sensors(muscles: tuple[str, ...], ropes: tuple[str, ...], *, gym: bool) -> l
     """Sensors of a system.
 
     Args:
-        muscles: names.
+        muscles: names of the muscles.
         ropes: names of the device's ropes.
-        gym: whether a weight is in the hand.
+        gym: whether the hand holds the handle of a gym machine.
     """
     gym_rope = [RopeSensor(name="gym_rope_tension", rope=ROPE, components=("tension",))] if gym else []
     return [

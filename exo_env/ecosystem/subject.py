@@ -14,54 +14,137 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
+
+from pydantic import ConfigDict, Field, model_validator
 
 from dms_core.config_files import config_file, configs
 from dms_core.errors import InputError, choices
+from dms_core.model.element import Vector
 from dms_core.yaml_text import read_yaml
+from exo_env.settings import Settings
 
 DEFAULT = "arm26"
 BODY_ROLES, JOINT_ROLES = ("torso", "humerus", "forearm"), ("mount", "shoulder", "elbow")
-SECTIONS = ("gravity", "roles", "grip", "bodies", "joints", "muscle_defaults", "muscles")
+SCALED = ("max_isometric_force", "optimal_fibre_length", "tendon_slack_length")
+"""Numbers of a muscle that are scaled to a person."""
+TIME_CONSTANTS = ("activation_time_constant", "deactivation_time_constant")
+"""Numbers of all muscles that are scaled to a patient."""
+
+
+class Facts(Settings):
+    """What a subject's file must hold; it may hold more, which nothing here reads."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+class BodyFacts(Facts):
+    """A body of the model."""
+
+    mass: float = Field(ge=0.0, description="mass [kg]")
+    centre_of_mass: Vector = Field(description="in the body's frame [m]")
+    inertia: Vector = Field(description="principal moments about the centre of mass [kg m^2]")
+
+
+class JointFacts(Facts):
+    """A joint of the model."""
+
+    point_i: Vector = Field(description="centre of the joint in the frame of its first body [m]")
+    axis_i: Vector | None = Field(default=None, description="axis of a hinge in the frame of its first body [-]")
+
+
+class PointFacts(Facts):
+    """A point of a muscle's path."""
+
+    body: str = Field(description="name of the body that holds it")
+    point: Vector = Field(description="in the body's frame [m]")
+
+
+class MuscleFacts(Facts):
+    """A muscle; further keys are fields of ThelenMuscle."""
+
+    path: tuple[PointFacts, ...] = Field(min_length=2, description="from origin to insertion")
+
+
+class RoleFacts(Facts):
+    """Names of the bodies, joints and muscles that the ecosystem of the elbow needs."""
+
+    torso: str
+    humerus: str
+    forearm: str
+    mount: str
+    shoulder: str
+    elbow: str
+    flexors: tuple[str, ...]
+
+
+class SubjectFacts(Facts):
+    """A whole file."""
+
+    gravity: Vector
+    roles: RoleFacts
+    grip: Vector
+    bodies: dict[str, BodyFacts]
+    joints: dict[str, JointFacts]
+    muscle_defaults: dict[str, Any]
+    muscles: dict[str, MuscleFacts] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Refuse roles that nothing has, and muscles that lack a number or lie on an unknown body."""
+        for roles, section, known in (
+            (BODY_ROLES, "bodies", self.bodies), (JOINT_ROLES, "joints", self.joints),
+        ):  # fmt: skip
+            for role in roles:
+                _check_role(role, getattr(self.roles, role), known, section)
+        for name in self.roles.flexors:
+            _check_role("flexors", name, self.muscles, "muscles")
+        if self.joints[self.roles.elbow].axis_i is None:
+            raise ValueError(f"joints.{self.roles.elbow}: 'axis_i' is missing")
+        for key in TIME_CONSTANTS:
+            if key not in self.muscle_defaults:
+                raise ValueError(f"muscle_defaults: '{key}' is missing")
+        bodies = [getattr(self.roles, role) for role in BODY_ROLES]
+        for name, muscle in self.muscles.items():
+            for key in SCALED:
+                if not hasattr(muscle, key) and key not in self.muscle_defaults:
+                    raise ValueError(f"muscles.{name}: '{key}' is missing")
+            for point in muscle.path:
+                if point.body not in bodies:
+                    raise ValueError(f"muscles.{name}.path: body = '{point.body}': expected one of {choices(bodies)}")
+        return self
+
+
+def _check_role(role: str, name: str, known: Mapping[str, Any], section: str) -> None:
+    """Refuse a role that nothing in the file has."""
+    if name not in known:
+        raise ValueError(f"roles: {role} = {name!r}; expected one of the {section} {choices(known)}")
 
 
 @cache
 def subject_facts(source: str) -> dict[str, Any]:
-    """What a subject file holds, checked and read once.
+    """Contents of a subject's file, checked and read once.
 
     Args:
         source: name of a shipped subject, or path of a YAML file.
 
     Raises:
-        InputError: there is no such subject, or the file lacks something; names file and key.
+        InputError: there is no such subject, or its file is wrong; names file, key and value.
     """
     path = _path(source)
     facts = read_yaml(path)
-    missing = [name for name in SECTIONS if name not in facts]
-    if missing:
-        raise InputError(f"{path}: the section '{missing[0]}' is missing; expected {', '.join(SECTIONS)}.")
-    roles = facts["roles"]
-    for kinds, section in ((BODY_ROLES, "bodies"), (JOINT_ROLES, "joints")):
-        for role in kinds:
-            _check_role(path, role, roles.get(role), facts[section], section)
-    if not isinstance(roles.get("flexors"), list) or not facts["muscles"]:
-        raise InputError(f"{path}: roles: expected a list of muscles as 'flexors', got {roles.get('flexors')!r}.")
-    for name in roles["flexors"]:
-        _check_role(path, "flexors", name, facts["muscles"], "muscles")
+    try:
+        SubjectFacts(**facts)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     return facts
 
 
 def _path(source: str) -> Path:
-    """File of a subject."""
+    """Path of the file of a subject."""
     if source.endswith((".yaml", ".yml")):
         return Path(source)
     shipped = sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
     if source not in shipped:
         raise InputError(f"subject = {source!r}: expected one of {choices(shipped)}, or a YAML file.")
     return config_file(f"subject/{source}.yaml")
-
-
-def _check_role(path: Path, role: str, name: Any, known: Mapping[str, Any], section: str) -> None:
-    """Refuses a part that nothing in the file plays."""
-    if name not in known:
-        raise InputError(f"{path}: roles: {role} = {name!r}; expected one of the {section} {choices(known)}.")

@@ -63,8 +63,8 @@ class WornExoskeleton:
 
     Args:
         device: the exoskeleton.
-        arm: whose humerus carries it.
-        misalignment: how it sits.
+        arm: arm whose humerus carries it.
+        misalignment: how the device is worn.
         guide: 'plane' (one row), 'line' (two) or 'slider' (five).
     """
 
@@ -77,7 +77,7 @@ class WornExoskeleton:
         """Whether the hinge axis is that of the elbow."""
         self.axes = axes
         self.shift = axes @ np.array(misalignment.shift)
-        """From the elbow centre to the hinge, in ground axes [m]."""
+        """Vector from the elbow centre to the hinge, in ground axes [m]."""
         self.orientation = quaternion_product(_orientation(axes), tilt)
         self.origin = arm.elbow + self.shift
 
@@ -129,7 +129,7 @@ class WornExoskeleton:
             reference: name of the input psi(t) [rad].
             authority: name of the input that scales the controller's command, 0 to 1 [-].
             offset: coordinate added to the reference [rad], such as a filtered setpoint.
-            start_tension: of the lifting rope [N]; None: that of a command without error.
+            start_tension: tension of the lifting rope [N]; None: that of a command without error.
         """
         d = self.device
         forces: list[Force] = [

@@ -17,7 +17,6 @@ settings. One with a page and an id of its own is a subclass in a file of its ow
 from __future__ import annotations
 
 import copy
-import math
 import warnings
 from collections.abc import Mapping
 from functools import cached_property
@@ -36,44 +35,37 @@ from exo_env.drives.drive import Drive, checked_action
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
+from exo_env.envs.draw import EpisodeDraws, Keys, checked_options
 from exo_env.envs.settings import (
-    MOST_CYCLE,
     SOLVER_OPTIONS,
     EnvSettings,
-    check_number,
-    check_whole,
+    checked_settings,
     control_steps,
     load_distribution,
-    within,
     worn_device,
     worn_misalignment,
 )
-from exo_env.patient.distributions import Draws
 from exo_env.patient.population import population
 from exo_env.rendering.scene import Scene
-from exo_env.streams import stream, uniform
 from exo_env.tasks.channels import Parts, Slice
-from exo_env.tasks.movement import START, Movement
+from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import NOTHING, Task
 from exo_env.world.control_period import finish, run_period
-from exo_env.world.episode import Draw, Episode
+from exo_env.world.episode import Episode
 from exo_env.world.readout import Readout
 from exo_env.world.tables import STATUS
 from exo_env.world.world import PatientWorld
 
-OPTIONS = ("patient", "load", "reference", "initial_angle_deg")
-LOAD, PHASE = "load", stream("tremor.phase")
-"""Random streams of the load and of the tremor's phase."""
 TRANSIENT = ("_episode", "_readout", "_renderer", "world")
-"""What a copy of an environment does without: it belongs to one process and one episode."""
+"""Attributes that a copy of an environment does without: they belong to one process and one episode."""
 
 
 class AssistanceEnv(gymnasium.Env):
     """One arm with a worn device, as an environment. See the page of a subclass, such as `ElbowLiftEnv`.
 
     Args:
-        settings: by keyword, see `EnvSettings` or the environment's page.
+        settings: settings by keyword, see `EnvSettings` or the environment's page.
 
     Raises:
         InputError: a setting is unknown or not usable.
@@ -85,22 +77,15 @@ class AssistanceEnv(gymnasium.Env):
     settings_type: ClassVar[type[EnvSettings]] = EnvSettings
     ecosystem_type: ClassVar[type[Ecosystem]] = Ecosystem
     duration: float = 6.0
-    """Of an episode [s], unless the settings say otherwise."""
+    """Length of an episode [s], unless the settings say otherwise."""
 
     def __init__(self, **settings: Any) -> None:
         # What a caller does to a mapping afterwards must not reach into the environment.
-        self.settings = s = self._checked(copy.deepcopy(settings))
+        self.settings = s = checked_settings(self.settings_type, copy.deepcopy(settings))
         if s.render_mode is not None:
             from exo_env.rendering.canvas import import_pygame
 
             import_pygame()
-        check_number("control_rate", s.control_rate, 5.0, 1000.0, "Hz")
-        if s.episode_duration is not None:
-            check_number("episode_duration", s.episode_duration, 0.1, 120.0, "s")
-        if s.rtol is not None:
-            check_number("rtol", s.rtol, 1e-8, 0.2)
-        if s.cycle is not None:
-            check_whole("cycle", s.cycle, MOST_CYCLE)
         self.render_mode, self.period = s.render_mode, 1.0 / s.control_rate
         self.metadata = {**type(self).metadata, "render_fps": round(s.control_rate)}
         self.duration = float(s.episode_duration or self.usual_duration(s))
@@ -119,35 +104,36 @@ class AssistanceEnv(gymnasium.Env):
         self.action_space = spaces.Box(-1.0, 1.0, (self.actions,), np.float32)
         self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
         self._weights = self.task.weights.model_dump()
-        self._loads = Draws({LOAD: self.load})
+        self._draws = EpisodeDraws(
+            self.population, self.load, self.movement, self.made_movement, self.duration, self.task.start_range()
+        )
         self._options: dict[str, Any] = {}
-        self._keys: list[int] = []
+        self._keys = Keys(s.cycle)
         self._episode: Episode | None = None
         self._readout: Readout | None = None
-        self._over, self._resets = False, 0
+        self._over = False
         self._renderer: Any = None
 
-    @classmethod
-    def _checked(cls, settings: Mapping[str, Any]) -> EnvSettings:
-        known = cls.settings_type.model_fields
-        for name in settings:
-            if name not in known:
-                raise InputError(f"setting '{name}' is unknown; there are {choices(known)}.")
-        return cls.settings_type(**settings)
-
     def usual_duration(self, settings: EnvSettings) -> float:
-        """Of an episode where the settings name none [s]."""
+        """Length of an episode where the settings name none [s]."""
         return type(self).duration
 
     def made_ecosystem(self, settings: EnvSettings) -> Ecosystem:
-        """Arm, device and machine."""
+        """Arm, device and machine of the settings."""
         return self.ecosystem_type(
             device=worn_device(settings.exoskeleton), subject=settings.subject,
             misalignment=worn_misalignment(settings.misalignment),
         )  # fmt: skip
 
     def made_movement(self, reference: Any) -> Movement:
-        """What patients intend, from the distributions that a user gives."""
+        """The movement that patients intend.
+
+        Args:
+            reference: changes of its distributions, None for none.
+
+        Raises:
+            InputError: one of them is unknown or not possible.
+        """
         return self._that_fits(self.task_type.movement_type.of(reference), reference)
 
     def _that_fits(self, movement: Movement, given: Any) -> Movement:
@@ -176,26 +162,30 @@ class AssistanceEnv(gymnasium.Env):
 
     @property
     def weights(self) -> Any:
-        """Of the reward terms."""
+        """Weights of the reward terms."""
         return self.task.weights
 
     @property
     def limits(self) -> Any:
-        """What ends an episode."""
+        """Limits that end an episode."""
         return self.task.limits
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """A new patient at the start of a movement.
+        """Begin an episode: a new patient at the start of a movement.
 
         Args:
-            seed: of the environment's one generator.
+            seed: seed of the environment's one generator.
             options: may fix 'patient' (whatever the constructor takes), 'load' [kg], 'reference' (numbers of the
                 movement) and 'initial_angle_deg' [deg]; nothing else changes by that.
 
+        Returns:
+            Observation and `info`, see `start_info`.
+
         Raises:
             InputError: an option is unknown or not usable.
+            SimulationError: the episode has no consistent start.
         """
         self.prepare(seed, options)
         self.begun(self.world.begin())
@@ -207,13 +197,21 @@ class AssistanceEnv(gymnasium.Env):
         return self.world.tables.observer.observation.astype(np.float32)
 
     def prepare(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
-        """First part of a reset: draw an episode. The second is compiled code, the third is `begun`."""
+        """First part of a reset: draw an episode. The second is compiled code, the third is `begun`.
+
+        Args:
+            seed: seed of the generator, None to go on.
+            options: options of the reset.
+
+        Raises:
+            InputError: an option is unknown or not usable.
+        """
         super().reset(seed=seed)
         self._over, self._episode = True, None
         if seed is not None:
-            self._keys, self._resets = [], 0
-        used = {**self._options, **self._known_options(options)}
-        self.world.prepare(self._drawn(self._key(), used))
+            self._keys.restart()
+        used = {**self._options, **checked_options(options)}
+        self.world.prepare(self._draws.draw(self._keys.next(self.np_random), used))
 
     def set_reset_options(self, options: Mapping[str, Any] | None) -> None:
         """Options of every reset from now on, for curricula; those that a reset is given come on top.
@@ -221,50 +219,21 @@ class AssistanceEnv(gymnasium.Env):
         Raises:
             InputError: an option is unknown.
         """
-        self._options = dict(self._known_options(options))
-
-    def _known_options(self, options: Mapping[str, Any] | None) -> Mapping[str, Any]:
-        if not isinstance(options, Mapping | None):
-            raise InputError(f"options = {options!r}: expected a mapping with some of {choices(OPTIONS)}, or None.")
-        for name in options or {}:
-            if name not in OPTIONS:
-                raise InputError(f"reset option '{name}' is unknown; there are {choices(OPTIONS)}.")
-        return options or {}
+        self._options = dict(checked_options(options))
 
     def begun(self, code: int) -> None:
-        """Last part of a reset, with what came of the compiled one."""
-        self._episode = self.world.begun(code)
+        """Last part of a reset.
+
+        Args:
+            code: what came of the compiled part, see world/reset.py.
+
+        Raises:
+            InputError: the arm could bring the rope's end to a pulley.
+            SimulationError: the episode has no consistent start.
+        """
+        self._episode = Episode(self.world, *self.world.begun(code))
         self._readout = Readout(self.world, self._episode)
         self._over = False
-
-    def _key(self) -> int:
-        """Key of the next episode's random streams: the one number that a reset takes from the generator."""
-        cycle, self._resets = self.settings.cycle, self._resets + 1
-        if cycle is not None and self._resets > cycle:
-            return self._keys[(self._resets - 1) % cycle]
-        key = int(self.np_random.integers(2**63))
-        if cycle is not None:
-            self._keys.append(key)
-        return key
-
-    def _drawn(self, key: int, options: Mapping[str, Any]) -> Draw:
-        """The episode of a key; what options fix is drawn from the same streams, and moves nothing else."""
-        k = np.uint64(key)
-        patients, loads, movement = self.population, self._loads, self.movement
-        if options:
-            if "patient" in options:
-                patients = population(options["patient"])
-            if "load" in options:
-                loads = Draws({LOAD: load_distribution(options["load"])})
-            if "reference" in options:
-                movement = self.made_movement(options["reference"])
-        numbers = movement.draw(k, self.duration)
-        start_deg = options.get("initial_angle_deg", numbers[movement.names.index(START)])
-        low, high = self.task.start_range()
-        if not within(start_deg, low, high):
-            raise InputError(f"initial_angle_deg = {start_deg!r}: expected a number from {low:g} to {high:g}.")
-        phase = 2.0 * math.pi * uniform(k, PHASE, 0)
-        return Draw(key, patients.draw(k), float(loads.sample(k)[0]), numbers, math.radians(start_deg), phase)
 
     @cached_property
     def world(self) -> PatientWorld:
@@ -276,7 +245,7 @@ class AssistanceEnv(gymnasium.Env):
 
     @property
     def packed(self) -> Packed:
-        """The packed WorldTables, for a batch."""
+        """The packed `WorldTables` of the world, for a batch."""
         return self.world.packed
 
     @property
@@ -298,10 +267,13 @@ class AssistanceEnv(gymnasium.Env):
         return self._readout
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One control period, over which the commands go linearly to those of an action.
+        """Do one control period, over which the commands go linearly to those of an action.
 
         Args:
-            action: numbers that are clipped to -1 to 1.
+            action: numbers, which are clipped to -1 to 1.
+
+        Returns:
+            Observation, reward, whether an event ended the episode, whether time did, and `info`.
 
         Raises:
             InputError: the action has another shape or is not finite.
@@ -340,10 +312,10 @@ class AssistanceEnv(gymnasium.Env):
         return self.readout.happened()
 
     def readings(self) -> dict[str, float]:
-        """Everything at the present time, without noise: every sensor of the model and what follows from them.
+        """Everything at the present time, without noise, by name.
 
-        Beside them 'time' [s], the readings of the task, the commands reached, counts and worst errors of the solver.
-        Units: `reading_units()`.
+        These are all components of the model's sensors, the readings of the task, the commands reached, 'time' [s], and
+        counts and worst errors of the solver. `reading_units()` gives the units.
         """
         return self.readout.readings()
 
@@ -353,7 +325,7 @@ class AssistanceEnv(gymnasium.Env):
         return dict(self.episode.model.layout.outputs) | units
 
     def start_info(self) -> dict[str, Any]:
-        """What the episode is made of."""
+        """The `info` of a reset: patient, load, ability, movement and angle of the start."""
         return self.readout.start_info(self.movement)
 
     def summary(self) -> str:
@@ -361,13 +333,13 @@ class AssistanceEnv(gymnasium.Env):
         return self.task.summary(self.observation_structure)
 
     def scene(self) -> Scene:
-        """What a picture shows of the present time."""
+        """Points and numbers of a picture of the present time."""
         from exo_env.rendering.episode_scene import scene_of
 
         return scene_of(self.readout, self._label())
 
     def _label(self) -> str:
-        """Names the patient in a picture."""
+        """Words that name the patient in a picture."""
         p = self.episode.patient
         return f"flexors {p.maximum_activation_flexors:.0%}, extensors {p.maximum_activation_extensors:.0%}"
 

@@ -15,13 +15,13 @@ from exo_env.tasks.repetition import MOST_REPETITIONS, Repetitions
 from exo_env.tasks.task import Task
 
 TIME = 6.0
-"""Of one repetition [s]."""
+"""Length of an episode of one repetition [s]."""
 
 
 class ElbowLiftSettings(EnvSettings):
     """The arguments of exo/ElbowLift-v1."""
 
-    repetitions: Any = Field(default=1, description="of the movement in an episode")
+    repetitions: Any = Field(default=1, description="number of repetitions in an episode")
 
 
 class ElbowLiftEnv(AssistanceEnv):
@@ -139,7 +139,7 @@ class ElbowLiftEnv(AssistanceEnv):
     settings: ElbowLiftSettings
 
     def usual_duration(self, settings: EnvSettings) -> float:
-        """Six seconds a repetition."""
+        """Length of an episode where the settings name none: six seconds a repetition [s]."""
         assert isinstance(settings, ElbowLiftSettings)
         check_whole("repetitions", settings.repetitions, MOST_REPETITIONS)
         return TIME * settings.repetitions

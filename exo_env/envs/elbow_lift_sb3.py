@@ -15,8 +15,8 @@ class ElbowLiftVecEnv(AssistanceVecEnv):
 
     Args:
         num_envs: number of worlds.
-        threads: that step them; None takes one for each core.
-        settings: of ElbowLiftEnv.
+        threads: number of threads that step them; None takes one for each core.
+        settings: settings of ElbowLiftEnv.
     """
 
     def __init__(self, num_envs: int, *, threads: int | None = None, **settings: Any) -> None:

@@ -1,19 +1,17 @@
-"""The arguments of an environment, and what is made of them."""
+"""The settings of an environment, and what is made of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
-from dms_core.yaml_text import read_yaml
-from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.exoskeleton import DEFAULT as DEFAULT_DEVICE
+from exo_env.ecosystem.exoskeleton import Exoskeleton, shipped_devices
 from exo_env.ecosystem.subject import DEFAULT
 from exo_env.ecosystem.worn_exoskeleton import Misalignment
 from exo_env.patient.distributions import Distribution, distribution
@@ -28,6 +26,7 @@ rtol 1e-6, in a third to a half more iterations."""
 DEFAULT_LOAD = {"uniform": [0.5, 2.0]}
 """Weight on the machine [kg]; assumed."""
 MOST_CYCLE = 100_000
+"""Largest number of different episodes that an environment remembers."""
 
 
 class EnvSettings(Settings):
@@ -48,7 +47,7 @@ class EnvSettings(Settings):
     control_rate: Any = Field(default=50.0, description="[Hz]")
     episode_duration: Any = Field(default=None, description="[s]")
     cycle: Any = Field(default=None, description="number of different episodes, after which the first comes again")
-    rtol: Any = Field(default=None, description="of the solver; None: that of the drive")
+    rtol: Any = Field(default=None, description="relative tolerance of the solver; None: that of the drive")
     render_mode: Literal["human", "rgb_array"] | None = None
 
 
@@ -62,7 +61,7 @@ def within(value: Any, low: float, high: float) -> bool:
 
 
 def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> None:
-    """Refuses what is no number between two limits.
+    """Refuse a value that is no number between two limits.
 
     Raises:
         InputError: names the argument and its value.
@@ -72,7 +71,7 @@ def check_number(name: str, value: Any, low: float, high: float, unit: str = "")
 
 
 def check_whole(name: str, value: Any, most: int) -> None:
-    """Refuses what is no whole number from 1 to `most`.
+    """Refuse a value that is no whole number from 1 to `most`.
 
     Raises:
         InputError: names the argument and its value.
@@ -81,11 +80,35 @@ def check_whole(name: str, value: Any, most: int) -> None:
         raise InputError(f"{name} = {value!r}: expected a whole number from 1 to {most}.")
 
 
-def control_steps(duration: float, rate: float) -> int:
-    """Control periods of an episode.
+def checked_settings(kind: type[EnvSettings], settings: Mapping[str, Any]) -> EnvSettings:
+    """Settings of an environment.
+
+    Args:
+        kind: class of the settings.
+        settings: what the user gives, by name.
 
     Raises:
-        InputError: there is not one.
+        InputError: a setting is unknown or not usable.
+    """
+    for name in settings:
+        if name not in kind.model_fields:
+            raise InputError(f"setting '{name}' is unknown; there are {choices(kind.model_fields)}.")
+    s = kind(**settings)
+    check_number("control_rate", s.control_rate, 5.0, 1000.0, "Hz")
+    if s.episode_duration is not None:
+        check_number("episode_duration", s.episode_duration, 0.1, 120.0, "s")
+    if s.rtol is not None:
+        check_number("rtol", s.rtol, 1e-8, 0.2)
+    if s.cycle is not None:
+        check_whole("cycle", s.cycle, MOST_CYCLE)
+    return s
+
+
+def control_steps(duration: float, rate: float) -> int:
+    """Number of control periods in an episode.
+
+    Raises:
+        InputError: the episode is shorter than one.
     """
     steps = round(duration * rate)
     if steps < 1:
@@ -97,18 +120,22 @@ def control_steps(duration: float, rate: float) -> int:
 
 
 def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:
-    """Distribution of the weight on the machine [kg]."""
+    """Distribution of the weight on the machine [kg].
+
+    Raises:
+        InputError: `load` is no number and no distribution of numbers that the machine takes.
+    """
     spec = DEFAULT_LOAD if load is None else load
     right = f"expected a number from {LEAST_LOAD} to {MOST_LOAD} kg, or a distribution of such numbers"
     try:
         if isinstance(spec, float) and not math.isfinite(spec):
             raise InputError(f"{right}.")
-        found = distribution(spec)
-        if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in found.limits()):
+        weights = distribution(spec)
+        if any(not within(x, LEAST_LOAD, MOST_LOAD) for x in weights.limits()):
             raise InputError(f"{right}.")
     except InputError as error:
         raise InputError(f"load = {load!r}: {error}") from None
-    return found
+    return weights
 
 
 def worn_device(source: Any) -> Exoskeleton:
@@ -117,32 +144,17 @@ def worn_device(source: Any) -> Exoskeleton:
     Raises:
         InputError: it is none of these, or a value is wrong.
     """
-    shipped = sorted(p.stem for p in (configs() / "exoskeletons").glob("*.yaml"))
+    if isinstance(source, str):
+        return Exoskeleton.named(source)
     if source is None or isinstance(source, Mapping):
         try:
-            return Exoskeleton.from_config("exoskeletons/elbow.yaml").changed(**(source or {}))
+            return Exoskeleton.named(DEFAULT_DEVICE).changed(**(source or {}))
         except InputError as error:
             raise InputError(f"exoskeleton: {error}") from None
-    if isinstance(source, str) and source.endswith((".yaml", ".yml")):
-        return read_device(source)
-    if source not in shipped:
-        raise InputError(
-            f"exoskeleton = {source!r}: expected one of {choices(shipped)}, a YAML file, or a mapping of changes of "
-            "the default device."
-        )
-    return Exoskeleton.from_config(f"exoskeletons/{source}.yaml")
-
-
-def read_device(path: str | Path) -> Exoskeleton:
-    """A device from a YAML file; configs/exoskeletons/elbow.yaml shows every key.
-
-    Raises:
-        InputError: the file is missing or wrong; names file, key and value.
-    """
-    try:
-        return Exoskeleton(**read_yaml(path))
-    except InputError as error:
-        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+    raise InputError(
+        f"exoskeleton = {source!r}: expected one of {choices(shipped_devices())}, a YAML file, or a mapping of changes "
+        "of the default device."
+    )
 
 
 def worn_misalignment(source: Any) -> Misalignment:

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+import gymnasium
 import numpy as np
+from gymnasium.envs.registration import load_env_creator
 
-from exo_env.envs.elbow_lift import ElbowLiftEnv
+from dms_core.errors import InputError, choices
+from exo_env.envs.base_env import AssistanceEnv
+from exo_env.tasks.task import FIRST_EVENT, NOTHING, SOLVER
+from exo_env.world.tables import STATUS
+
+DEFAULT = "exo/ElbowLift-v1"
 
 
 def soak(
     steps: int,
     *,
+    env: str = DEFAULT,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
     **settings: Any,
@@ -23,34 +32,39 @@ def soak(
 
     Args:
         steps: control periods in all.
-        seed: of the environment and of the actions.
-        progress: called with the number of steps done.
-        settings: of the environment; the observation has all groups.
+        env: id of the environment.
+        seed: seed of the environment and of the actions.
+        progress: is called with the number of steps done.
+        settings: settings of the environment; the observation has all groups unless they say otherwise.
 
     Returns:
         Counts of episodes, of what ended them and of failed solves, and the worst figures of all steps.
+
+    Raises:
+        InputError: there is no such environment, or it is none of AssistanceEnv.
     """
-    env = ElbowLiftEnv(**({"patient": "evaluation", "observation": ["device", "emg", "privileged"]} | settings))
+    world = _made(env, {"patient": "evaluation"} | settings)
     actions = np.random.default_rng(seed)
     ends: Counter[str] = Counter()
     failures: list[str] = []
     bad, worst = 0, {"phi": 0.0, "phi_v": 0.0, "drift_rad": 0.0, "step_ms": 0.0}
-    observation, _ = env.reset(seed=seed)
+    observation, _ = world.reset(seed=seed)
     begin = time.perf_counter()
     for k in range(steps):
         before = time.perf_counter()
-        observation, reward, terminated, truncated, info = env.step(actions.uniform(-1.0, 1.0, env.action_space.shape))
+        action = actions.uniform(-1.0, 1.0, world.action_space.shape)
+        observation, reward, terminated, truncated, info = world.step(action)
         worst["step_ms"] = max(worst["step_ms"], 1e3 * (time.perf_counter() - before))
-        bad += not (np.isfinite(observation).all() and np.isfinite(reward) and observation in env.observation_space)
+        bad += not (np.isfinite(observation).all() and np.isfinite(reward) and observation in world.observation_space)
         if info["solver_failed"]:
             failures.append(info["event"])
         if terminated or truncated or k == steps - 1:
-            ends[_kind(info, truncated)] += 1
-            r = env.readings()
+            ends[_end(world, truncated)] += 1
+            r = world.readings()
             worst["phi"] = max(worst["phi"], r["solver.largest_phi"])
             worst["phi_v"] = max(worst["phi_v"], r["solver.largest_phi_v"])
             worst["drift_rad"] = max(worst["drift_rad"], abs(r["tracking.drift"]))
-            observation, _ = env.reset()
+            observation, _ = world.reset()
         if progress is not None:
             progress(k + 1)
     return {
@@ -61,11 +75,40 @@ def soak(
     }  # fmt: skip
 
 
-def _kind(info: dict[str, Any], truncated: bool) -> str:
-    """Why an episode ended."""
-    sentence = info.get("event")
-    if sentence is None:
-        return "time" if truncated else "end of the soak"
-    if info["solver_failed"]:
+def _made(name: str, settings: dict[str, Any]) -> AssistanceEnv:
+    """The environment of an id, with all groups of observations.
+
+    Raises:
+        InputError: there is no such environment, or it is none of AssistanceEnv.
+    """
+    module, _, plain = name.rpartition(":")
+    try:
+        if module:
+            importlib.import_module(module)
+        spec = gymnasium.spec(plain)
+    except (gymnasium.error.Error, ImportError) as error:
+        right = f"expected one of {choices(_ids())}, or 'module:id' of an environment of one's own"
+        raise InputError(f"env = {name!r}: {right} ({error})") from None
+    maker = load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
+    if not (isinstance(maker, type) and issubclass(maker, AssistanceEnv)):
+        raise InputError(
+            f"env = {name!r}: expected an environment that is an AssistanceEnv, such as {choices(_ids())}."
+        )
+    fixed = {**spec.kwargs, **settings}
+    groups = list(maker(**fixed).task.groups)
+    return maker(**{"observation": groups, **fixed})
+
+
+def _ids() -> list[str]:
+    """Ids of the shipped environments."""
+    return [name for name in gymnasium.registry if name.startswith("exo/")]
+
+
+def _end(env: AssistanceEnv, truncated: bool) -> str:
+    """Why an episode ended: an event by its name, time, or the end of the run."""
+    code = int(env.world.tables.status[STATUS.event])
+    if code == SOLVER:
         return "solver"
-    return next((kind for kind in ("reaction", "rope") if kind in sentence), "angle")
+    if code != NOTHING:
+        return env.task.events[code - FIRST_EVENT]
+    return "time" if truncated else "end of the soak"

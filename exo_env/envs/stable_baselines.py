@@ -17,8 +17,8 @@ class AssistanceVecEnv(VecEnv):
     """N worlds that reset by themselves; infos of an ended episode have what Stable-Baselines3 looks for.
 
     `terminal_observation` is the last observation, and `TimeLimit.truncated` tells an episode that time ended from one
-    that an event did, so that value estimates bootstrap where they should. An ended episode's time, what the task
-    tells, and solver_failed are in it too.
+    that an event did, so that value estimates bootstrap where they should. An ended episode's time, the numbers that
+    the task reports, and solver_failed are in it too.
 
     Args:
         worlds: a batch, made with `autoreset_mode="SameStep"`.
@@ -40,25 +40,25 @@ class AssistanceVecEnv(VecEnv):
         Both hold for this reset, as everywhere in Stable-Baselines3; `env_method("set_reset_options", {...})` gives
         options of the automatic resets behind an episode's end.
         """
-        found, _ = self.worlds.reset_each(self._seeds, self._options)
+        observations, _ = self.worlds.reset_each(self._seeds, self._options)
         self._reset_seeds()
         self._reset_options()
-        return found
+        return observations
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Remember the actions."""
+        """Keep the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """A control period of every world."""
+        """Do a control period of every world; see `VecEnv`."""
         assert self._actions is not None
-        observations, rewards, terminated, truncated, told = self.worlds.step(self._actions)
+        observations, rewards, terminated, truncated, stepped = self.worlds.step(self._actions)
         over = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(over):
-            final = {name: x for name, x in told["final_info"].items() if not name.startswith("_")}
+            final = {name: x for name, x in stepped["final_info"].items() if not name.startswith("_")}
             infos[i] = {name: x[i] for name, x in final.items() if isinstance(x, np.ndarray) and name != "event"} | {
-                "terminal_observation": told["final_obs"][i],
+                "terminal_observation": stepped["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
             }
         return observations, rewards.astype(np.float32), over, infos
@@ -99,7 +99,7 @@ class AssistanceVecEnv(VecEnv):
         ]
 
     def env_is_wrapped(self, wrapper_class: type, indices: None | int | Iterable[int] = None) -> list[bool]:
-        """Worlds have no wrappers."""
+        """False for each world: worlds have no wrappers."""
         return [False for _ in self._get_indices(indices)]
 
 

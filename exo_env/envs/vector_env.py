@@ -21,7 +21,7 @@ from exo_env.world.reset import BEGUN
 from exo_env.world.tables import STATUS
 
 EPISODE = attrgetter("_episode")
-"""Of an environment, None where there is none: cheaper than the property, which raises."""
+"""Gives the episode of an environment, None where there is none: cheaper than the property, which raises."""
 
 
 class AssistanceVectorEnv(VectorEnv):
@@ -31,10 +31,10 @@ class AssistanceVectorEnv(VectorEnv):
 
     Args:
         num_envs: number of worlds.
-        autoreset_mode: of gymnasium.vector.AutoresetMode: at the step after an episode's end (default), at the same
-            step, or never.
-        threads: that step the worlds; None takes one for each core.
-        settings: of the environment.
+        autoreset_mode: a gymnasium.vector.AutoresetMode: a new episode begins at the step after the last one's end
+            (default), at the same step, or at a call of `reset` only.
+        threads: number of threads that step the worlds; None takes one for each core.
+        settings: settings of the environment.
 
     Raises:
         InputError: a setting is not usable.
@@ -67,14 +67,14 @@ class AssistanceVectorEnv(VectorEnv):
         self.observation_space = batch_space(one.observation_space, self.num_envs)
         self.action_space = batch_space(one.action_space, self.num_envs)
         self._task: Task = one.task
-        self._batch = Batch(self.num_envs, one.observer.size, len(one.task.terms), _told_places(one.task), threads)
+        self._batch = Batch(self.num_envs, one.observer.size, len(one.task.terms), _reported_places(one.task), threads)
         self._over = np.ones(self.num_envs, bool)
         self._episodes: list[Episode | None] = [None] * self.num_envs
         self._started = False
 
     @property
     def observation_structure(self) -> tuple:
-        """As that of one environment."""
+        """Parts of one environment's observation, see `AssistanceEnv.observation_structure`."""
         return self.envs[0].observation_structure
 
     def reset(
@@ -83,8 +83,8 @@ class AssistanceVectorEnv(VectorEnv):
         """Reset all worlds, or those of options['reset_mask'].
 
         Args:
-            seed: of the first world, one more for each further one; or one a world.
-            options: of the environment's reset, and 'reset_mask', booleans of shape (num_envs,).
+            seed: seed of the first world, of which each further one has one more; or a list of one a world.
+            options: options of the environment's reset, and 'reset_mask', booleans of shape (num_envs,).
 
         Raises:
             InputError: seeds or mask do not fit, or an option is not usable.
@@ -98,7 +98,16 @@ class AssistanceVectorEnv(VectorEnv):
     def reset_each(
         self, seeds: Sequence[int | None], options: Sequence[dict[str, Any]], mask: np.ndarray | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """As `reset`, with a seed and options for each world, shape (num_envs,); `mask`: those that are reset."""
+        """Reset worlds with a seed and options for each, see `reset`.
+
+        Args:
+            seeds: seed of each world, None to go on, shape (num_envs,).
+            options: options of each world, shape (num_envs,).
+            mask: which worlds are reset, shape (num_envs,); None: all.
+
+        Raises:
+            InputError: an option is not usable.
+        """
         where = np.ones(self.num_envs, bool) if mask is None else mask
         # A reset that fails half-way leaves nothing to step.
         self._over[where], self._started = True, False
@@ -112,7 +121,7 @@ class AssistanceVectorEnv(VectorEnv):
             env.set_reset_options(options)
 
     def _mask(self, mask: Any) -> np.ndarray:
-        """Worlds to reset."""
+        """Which worlds are reset, shape (num_envs,)."""
         if mask is None:
             return np.ones(self.num_envs, bool)
         if not (isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == bool and mask.any()):
@@ -122,7 +131,7 @@ class AssistanceVectorEnv(VectorEnv):
         return mask
 
     def _seeds(self, seed: Any) -> list[int | None]:
-        """One a world."""
+        """The seed of each world."""
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):
@@ -153,12 +162,12 @@ class AssistanceVectorEnv(VectorEnv):
         return infos
 
     def _take_over(self, i: int) -> None:
-        """World i from its environment, which has ordered its equations anew."""
+        """Take world i over from its environment, which has ordered its equations anew."""
         self._batch.put(i, self.envs[i].packed)
         self._batch.take(i)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """A control period of every world.
+        """Do a control period of every world.
 
         Args:
             actions: shape (num_envs, n); beyond -1 to 1 they are clipped.
@@ -193,7 +202,7 @@ class AssistanceVectorEnv(VectorEnv):
         return self._batch.observations.copy(), rewards, terminated, truncated, infos
 
     def _checked(self, actions: Any) -> np.ndarray:
-        """Finite actions within the box."""
+        """The actions, clipped to the box; refuses those that are not finite or of another shape."""
         used = np.asarray(actions, float)
         if used.shape != self.action_space.shape:
             raise InputError(f"actions have shape {used.shape}: expected {self.action_space.shape}.")
@@ -202,22 +211,22 @@ class AssistanceVectorEnv(VectorEnv):
             raise InputError(f"actions[{i}] = {used[i].tolist()}: expected finite numbers.")
         return np.clip(used, -1.0, 1.0)
 
-    def _same_step(self, ended: np.ndarray, told: dict[str, Any]) -> dict[str, Any]:
+    def _same_step(self, ended: np.ndarray, stepped: dict[str, Any]) -> dict[str, Any]:
         """Begin the episodes of worlds that ended one now; what they ended with is in final_obs and final_info."""
         last, infos = self._batch.observations.copy(), self._infos(~ended) if not ended.all() else {}
-        plain = ("time", *(number.name for number in self._task.told), "solver_failed")
+        plain = ("time", *(number.name for number in self._task.reported), "solver_failed")
         for i in np.flatnonzero(ended).tolist():
-            final = {name: told[name][i].item() for name in plain}
-            final |= {group: {name: told[group][name][i].item() for name in self._task.terms} for group in GROUPED}
-            if "event" in told and told["_event"][i]:
-                final["event"] = told["event"][i]
+            final = {name: stepped[name][i].item() for name in plain}
+            final |= {group: {name: stepped[group][name][i].item() for name in self._task.terms} for group in GROUPED}
+            if "event" in stepped and stepped["_event"][i]:
+                final["event"] = stepped["event"][i]
             infos = self._add_info(infos, {"final_obs": last[i], "final_info": final}, i)
         return self._begin(ended, infos)
 
     def _infos(self, running: np.ndarray) -> dict[str, Any]:
         """Infos of a step as Gymnasium's own vector environments give them: arrays, and masks of where they hold."""
         numbers, status, task = self._batch.numbers, self._batch.status, self._task
-        terms, told = numbers[:, 1 : 1 + len(task.terms)].T, numbers[:, 1 + len(task.terms) :].T
+        terms, reported = numbers[:, 1 : 1 + len(task.terms)].T, numbers[:, 1 + len(task.terms) :].T
 
         def where(column: np.ndarray) -> np.ndarray:
             return np.where(running, column, 0.0)
@@ -229,7 +238,10 @@ class AssistanceVectorEnv(VectorEnv):
             "reward_terms": values | masks,
             "reward_weights": weights | {name: mask.copy() for name, mask in masks.items()},
             "time": where(status[:, STATUS.step] * self.envs[0].period),
-            **{number.name: where(number.factor * column) for number, column in zip(task.told, told, strict=True)},
+            **{
+                number.name: where(number.factor * column)
+                for number, column in zip(task.reported, reported, strict=True)
+            },
             "solver_failed": running & (status[:, STATUS.event] == SOLVER),
         }
         infos |= {f"_{name}": running.copy() for name in list(infos)}
@@ -242,7 +254,7 @@ class AssistanceVectorEnv(VectorEnv):
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Refused: the worlds are addresses of this process."""
+        """Refuse copies: the worlds are addresses of this process."""
         raise TypeError(f"{type(self).__name__} cannot be copied or pickled; make another one of the same settings.")
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -253,10 +265,10 @@ class AssistanceVectorEnv(VectorEnv):
 
 
 GROUPED = ("reward_terms", "reward_weights")
-"""Infos of a step that are one number a world and term."""
+"""Keys of a step's infos that hold one number for each world and reward term."""
 
 
-def _told_places(task: Task) -> np.ndarray:
-    """Place of each reading that infos tell."""
+def _reported_places(task: Task) -> np.ndarray:
+    """Place of each reading that infos have."""
     names, first = [reading.name for reading in task.readings], first_places(task.readings)
-    return np.array([first[names.index(number.reading)] for number in task.told], np.int64)
+    return np.array([first[names.index(number.reading)] for number in task.reported], np.int64)

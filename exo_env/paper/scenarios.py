@@ -1,4 +1,15 @@
-"""The four scenarios of the paper (sect. 4.2): one exercise, shared in four ways by subject and device."""
+"""Scenarios (sect. 4.2 of the paper): one exercise, shared in one way or another by subject and device.
+
+The paper has four, in configs/scenarios. One's own is a `Scenario` and an `Exercise`, in Python or as YAML files of the
+same keys, done with any arm, device and machine:
+
+    exercise, (healthy, *_) = load_scenarios()
+    weak = healthy.changed(title="a third of the activation", maximum_activation=0.33, assistance=1.0)
+    done = run(weak, exercise, Ecosystem(device=Exoskeleton.named("mine.yaml")))
+    done.times, done.values["elbow_angle.angle"], done.values["exo_moment"]
+
+`python -m exo_env scenarios` makes tables and figures of such runs.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dms_core import Model, SolverOptions, Trajectory, simulate
 from dms_core.errors import InputError
@@ -17,23 +28,51 @@ from exo_env.ecosystem.ecosystem import Ecosystem, Proprioception
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.patient.motor_command import InternalModel, MotorCommand, plan
 from exo_env.settings import Settings
+from exo_env.tasks.limits import Limits
 
 FILES = ("1_healthy", "2_passive", "3_impaired", "4_heavy")
+"""Names of the paper's four scenarios, in its order."""
 SAMPLE = 0.005
 """Interval of the tables and of every number taken from them [s]."""
+SHORTEST = 0.1
+"""Shortest exercise [s], a few samples of the motor command."""
 
 
 class Exercise(Settings):
-    """The movement and how the subject feels it."""
+    """The movement and how the subject feels it, as in configs/scenarios/exercise.yaml.
 
-    times: tuple[float, ...] = Field(min_length=2, description="knots of the reference [s]")
-    angles_deg: tuple[float, ...] = Field(description="elbow angle at the knots [deg]")
-    duration: float = Field(gt=0.0, description="[s]")
+    The elbow goes from knot to knot with moves of minimum jerk, and rests before the first and behind the last.
+
+    Example:
+        >>> exercise = Exercise(times=(0.2, 1.2), angles_deg=(30, 80), duration=1.5, proprioception={"gain": 0.2})
+        >>> round(exercise.turning, 3)
+        0.7
+    """
+
+    times: tuple[float, ...] = Field(min_length=2, description="knots of the reference [s], from 0, in rising order")
+    angles_deg: tuple[float, ...] = Field(description="elbow angle at each knot [deg]")
+    duration: float = Field(ge=SHORTEST, le=120.0, description="of the exercise [s], at least the last of the times")
     proprioception: Proprioception
+
+    @model_validator(mode="after")
+    def _possible(self):
+        """Refuse knots that no elbow can follow."""
+        times, angles, limits = list(self.times), list(self.angles_deg), Limits()
+        if len(angles) != len(times):
+            raise ValueError(f"angles_deg = {angles}: expected {len(times)} angles, one for each of the times")
+        if times[0] < 0.0 or any(b <= a for a, b in zip(times[:-1], times[1:], strict=True)):
+            raise ValueError(f"times = {times}: expected times from 0 s in rising order")
+        if self.duration < times[-1]:
+            raise ValueError(f"duration = {self.duration}: expected at least the last of the times, {times[-1]} s")
+        if any(not limits.lowest_deg <= a <= limits.highest_deg for a in angles):
+            raise ValueError(
+                f"angles_deg = {angles}: expected angles from {limits.lowest_deg:g} to {limits.highest_deg:g} deg"
+            )
+        return self
 
     @property
     def reference(self) -> MinimumJerk:
-        """psi(t) [rad]."""
+        """The reference psi(t) [rad]."""
         return MinimumJerk(times=self.times, values=tuple(np.radians(self.angles_deg)))
 
     @property
@@ -42,7 +81,7 @@ class Exercise(Settings):
         return 0.5 * (self.times[0] + self.times[-1])
 
     def course(self, t: float) -> tuple[float, float, float]:
-        """(psi [rad], its rate [rad/s], its acceleration [rad/s^2]) at a time [s]."""
+        """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at a time [s]."""
         pieces = self.reference.pieces()
         k = max(int(np.searchsorted(pieces.t, t, side="right")) - 1, 0)
         curve = np.polynomial.Polynomial(pieces.c[k])
@@ -51,7 +90,13 @@ class Exercise(Settings):
 
 
 class Scenario(Settings):
-    """One way of doing the exercise, as in configs/scenarios."""
+    """One way of sharing the exercise between subject and device, as in configs/scenarios.
+
+    Example:
+        >>> weak = Scenario(title="a third", maximum_activation=0.33, assistance=1, weight=1, expected_weight=1)
+        >>> weak.changed(weight=2.0).weight
+        2.0
+    """
 
     title: str = Field(description="shown in figures")
     maximum_activation: float = Field(ge=0.0, le=1.0, description="factor on the subject's command [-]")
@@ -68,7 +113,7 @@ def load_scenarios() -> tuple[Exercise, list[Scenario]]:
 
 @dataclass(frozen=True)
 class ScenarioRun:
-    """A scenario that was simulated."""
+    """A scenario that was simulated, and what came of it."""
 
     scenario: Scenario
     exercise: Exercise
@@ -77,18 +122,18 @@ class ScenarioRun:
 
     @cached_property
     def times(self) -> np.ndarray:
-        """Times of the table [s]."""
+        """Times of the table [s], shape (n,)."""
         end = self.trajectory.t[-1]
         return np.minimum(np.arange(0, int(end / SAMPLE + 1e-6) + 1) * SAMPLE, end)
 
     @cached_property
     def values(self) -> dict[str, np.ndarray]:
-        """Every sensor at these times, by name."""
+        """Every component of the model's sensors at these times, by name, each of shape (n,)."""
         return self.trajectory.sensors(self.times)
 
     @cached_property
     def reference(self) -> np.ndarray:
-        """psi at these times [rad]."""
+        """psi at these times [rad], shape (n,)."""
         return np.array([self.exercise.course(t)[0] for t in self.times])
 
 
@@ -98,7 +143,17 @@ def build(scenario: Scenario, exercise: Exercise, ecosystem: Ecosystem | None = 
     Args:
         scenario: how the exercise is shared.
         exercise: the movement.
-        ecosystem: person, device and machine; weight and proprioception are set here. Default: the paper's system.
+        ecosystem: person, arm, device and machine; weight and proprioception are set here. Default: the paper's system.
+
+    Raises:
+        InputError: the ecosystem has no gym machine.
+        SimulationError: the subject's command does not settle.
+
+    Example:
+        >>> exercise, scenarios = load_scenarios()
+        >>> model, command = build(scenarios[2], exercise, Ecosystem(person=Person(height=1.6)))
+        >>> command.activations.shape
+        (276, 6)
     """
     base = ecosystem or Ecosystem()
     if base.machine is None:
@@ -106,7 +161,7 @@ def build(scenario: Scenario, exercise: Exercise, ecosystem: Ecosystem | None = 
     felt = exercise.proprioception
     scaled = felt.changed(gain=felt.gain * scenario.maximum_activation)
     joined = base.changed(weight=scenario.weight, proprioception=scaled)
-    command = _planned(Arm(base.person), base.machine, scenario.expected_weight, exercise)
+    command = _planned(base.arm(), base.machine, scenario.expected_weight, exercise)
     system = joined.system(
         float(np.radians(exercise.angles_deg[0])),
         exercise.reference,
@@ -130,10 +185,24 @@ def run(
     options: SolverOptions | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ScenarioRun:
-    """Simulate a scenario; `progress` is called with the time reached [s].
+    """Simulate a scenario.
+
+    Args:
+        scenario: how the exercise is shared.
+        exercise: the movement.
+        ecosystem: person, arm, device and machine; weight and proprioception are set here. Default: the paper's system.
+        options: options of the solver.
+        progress: is called with the time reached [s].
 
     Raises:
-        SimulationError: the run did not reach its end.
+        InputError: the ecosystem has no gym machine.
+        SimulationError: the run did not reach its end, or the subject's command does not settle.
+
+    Example:
+        >>> exercise, scenarios = load_scenarios()
+        >>> done = run(scenarios[0].changed(weight=2.0), exercise, Ecosystem(subject="arm26"))
+        >>> round(float(done.values["elbow_angle.angle"].max()), 2)  # [rad]
+        1.48
     """
     model, command = build(scenario, exercise, ecosystem)
     trajectory = simulate(model, exercise.duration, options, progress).check()

@@ -26,16 +26,16 @@ Numbers = Sequence[float]
 
 @dataclass(frozen=True)
 class Ordering:
-    """One statement."""
+    """One statement of the paper, as an order of numbers."""
 
     figure: str
     statement: str
     key: str
-    """Which number of the summaries."""
+    """Name of the number in the summaries."""
     scenarios: tuple[int, ...]
     holds: Callable[[Numbers], bool]
     why_not: str = ""
-    """Where it is false in our default system: the reason."""
+    """Reason for which it is false in our default system, where it is."""
 
 
 def _falling(x: Numbers) -> bool:
@@ -106,33 +106,41 @@ ORDERINGS = (
 )  # fmt: skip
 
 
-def judged(summaries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def judged(summaries: Sequence[dict[str, Any]], *, shipped: bool = True) -> list[dict[str, Any]]:
     """Every statement with its numbers by scenario and whether it holds.
 
+    A statement on a muscle or a rope that the subject or the device does not have is left out.
+
     Args:
-        summaries: of scenarios 1 to 4, as exo_env.paper.summary gives them.
+        summaries: numbers of the paper's scenarios 1 to 4, as exo_env.paper.summary gives them.
+        shipped: whether subject and device are the shipped ones, which the reasons for a false statement are about.
     """
     full = [_with_ratios(s) for s in summaries]
-    found = []
-    for o in ORDERINGS:
-        numbers = [full[k - 1][o.key] for k in o.scenarios]
-        holds = bool(o.holds(numbers))
-        entry = {
-            "figure": o.figure,
-            "statement": o.statement,
-            "quantity": o.key,
-            "numbers": {f"scenario_{k}": x for k, x in zip(o.scenarios, numbers, strict=True)},
-            "holds": holds,
-        }
-        found.append(entry if holds else {**entry, "why_not": o.why_not or "not foreseen; look at the figures"})
-    return found
+    return [_verdict(o, full, shipped) for o in ORDERINGS if all(o.key in full[k - 1] for k in o.scenarios)]
+
+
+def _verdict(o: Ordering, full: Sequence[dict[str, Any]], shipped: bool) -> dict[str, Any]:
+    """A statement with its numbers and, where it is false, the reason."""
+    numbers = [full[k - 1][o.key] for k in o.scenarios]
+    holds = bool(o.holds(numbers))
+    entry = {
+        "figure": o.figure,
+        "statement": o.statement,
+        "quantity": o.key,
+        "numbers": {f"scenario_{k}": x for k, x in zip(o.scenarios, numbers, strict=True)},
+        "holds": holds,
+    }
+    if holds:
+        return entry
+    unknown = "not foreseen; look at the figures" if shipped else "of another subject or device; look at the figures"
+    return {**entry, "why_not": (shipped and o.why_not) or unknown}
 
 
 def _with_ratios(s: dict[str, Any]) -> dict[str, Any]:
     """A summary with what follows from its numbers."""
-    return {
-        **s,
-        "peak_shortfall_deg": s["reference_peak_angle_deg"] - s["peak_angle_deg"],
-        "biceps_lifting_over_release": s["mean_biceps_long_lifting_N"] / s["mean_biceps_long_release_N"],
-        "triceps_release_over_lifting": s["mean_triceps_long_release_N"] / s["mean_triceps_long_lifting_N"],
-    }
+    ratios = {"peak_shortfall_deg": s["reference_peak_angle_deg"] - s["peak_angle_deg"]}
+    for muscle, above, below in (("biceps", "lifting", "release"), ("triceps", "release", "lifting")):
+        if f"mean_{muscle}_long_{above}_N" in s:
+            mean = [s[f"mean_{muscle}_long_{half}_N"] for half in (above, below)]
+            ratios[f"{muscle}_{above}_over_{below}"] = mean[0] / mean[1]
+    return s | ratios

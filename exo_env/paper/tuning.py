@@ -34,6 +34,7 @@ from dms_core.model.control.ziegler_nichols import (
 )
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import Exoskeleton
+from exo_env.ecosystem.subject import DEFAULT
 
 START = radians(60.0)
 """Elbow angle at which the step begins [rad]: the middle of the exercise."""
@@ -53,7 +54,7 @@ PROBE = 100.0
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of the procedure."""
+    """Result of the Ziegler-Nichols procedure."""
 
     critical: CriticalGain
     gains: Gains
@@ -66,9 +67,11 @@ class StepExperiment:
 
     Args:
         device: the exoskeleton; its own gains and the motors' limit do not count.
+        subject: anatomy, a shipped one by name or a YAML file.
     """
 
-    def __init__(self, device: Exoskeleton) -> None:
+    def __init__(self, device: Exoskeleton, subject: str = DEFAULT) -> None:
+        self.subject = subject
         # A limit no response reaches.
         self.device = device.changed(actuator=device.actuator.changed(max_tension=1e6))
         slow, fast = (self._acceleration(tension) for tension in (0.0, PROBE))
@@ -76,7 +79,7 @@ class StepExperiment:
 
     def _ecosystem(self, gains: Gains) -> Ecosystem:
         pid = {"kp": gains.kp, "ki": gains.ki, "kd": gains.kd}
-        return Ecosystem(device=self.device.changed(gains=pid), machine=None)
+        return Ecosystem(device=self.device.changed(gains=pid), subject=self.subject, machine=None)
 
     def _acceleration(self, tension: float) -> float:
         """Elbow acceleration at the start under a tension of the agonist [rad/s^2]; linear in it."""
@@ -94,7 +97,7 @@ class StepExperiment:
 
 
 def proportional(kp: float) -> Gains:
-    """Gains of the experiment."""
+    """Gains of the experiment, of a proportional controller."""
     return Gains(kp, 0.0, 0.0)
 
 
@@ -103,7 +106,10 @@ def tune(device: Exoskeleton, progress: Callable[[float, float], None] | None = 
 
     Args:
         device: the exoskeleton.
-        progress: called with each gain [N/rad] and the growth of its oscillation [-].
+        progress: is called with each gain [N/rad] and the growth of its oscillation [-].
+
+    Raises:
+        InputError: no gain makes the device oscillate.
     """
     experiment = StepExperiment(device)
     known: dict[float, tuple[np.ndarray, np.ndarray]] = {}
@@ -125,7 +131,7 @@ def tune(device: Exoskeleton, progress: Callable[[float, float], None] | None = 
 
 
 def what_limits(device: Exoskeleton, Kc: float) -> str:
-    """A sentence."""
+    """A sentence on what keeps the gain from being raised above the critical gain Kc [N/rad]."""
     lag, moment_arm = device.actuator.time_constant, device.moment_arm(device.lifting_rope, START)
     return (
         f"the motors' first-order lag of {1e3 * lag:g} ms: Kc times the rope's moment arm of {1e3 * moment_arm:.1f} mm "

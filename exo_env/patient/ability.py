@@ -32,7 +32,7 @@ MIDDLE = math.radians(60.0)
 ABLE = 0.2
 """Ability from which a patient can do something [-]."""
 SMALLEST_SCALE = 1.0
-"""Of the need, where a movement hardly needs anything [Nm]."""
+"""Least scale of the need, for a movement that hardly needs anything [Nm]."""
 
 
 @compiled
@@ -48,14 +48,14 @@ def voluntary(patient, arm, angle):
 
 @compiled
 def able(patient, arm, load):
-    """Share of arm and load that a patient can hold [-]; tables as in command_kernel.py."""
+    """Share of arm and load that a patient can hold [-]; tables as in static_optimisation.py."""
     hold = needed_moment(arm, load, MIDDLE, 0.0, 0.0)
     return min(max(voluntary(patient, arm, MIDDLE) / hold, 0.0), 1.0) if hold > 0.0 else 1.0
 
 
 @compiled
 def put_lacking(patient, arm, load, link, course, lacking):
-    """Fill M_lack [Nm] along a course; gives ability and scale of `Need`."""
+    """Fill M_lack [Nm] along a course; gives ability and scale as in `Need`."""
     ability, total, gravity = able(patient, arm, load), 0.0, vec(load.gravity, 0)
     g = math.sqrt(dot(gravity, gravity))
     for k in range(course.shape[0]):
@@ -71,21 +71,21 @@ def voluntary_moment(patient: Patient, known: InternalModel, angle: float = MIDD
 
 
 def ability(patient: Patient, known: InternalModel) -> float:
-    """What the patient can hold of arm and load, from 0 to 1 [-].
+    """Share of arm and load that the patient can hold, from 0 to 1 [-].
 
     Args:
-        patient: who.
-        known: arm, machine and real weight.
+        patient: the patient.
+        known: internal model with the patient's arm, the machine and the real weight.
     """
     return able(patient.row(), known.arm, known.load)
 
 
 @dataclass(frozen=True)
 class Need:
-    """Of one episode."""
+    """What the movement of an episode needs, and what the patient lacks of it."""
 
     ability: float
-    """Of the patient with this load [-]."""
+    """Ability of the patient with this load [-]."""
     lacking: np.ndarray
     """M_lack at each control time [Nm], shape (n,)."""
     scale: float

@@ -31,7 +31,7 @@ Value = float | str
 
 
 class Constant(Settings):
-    """The same for all."""
+    """The same value for all."""
 
     constant: Value
 
@@ -40,12 +40,12 @@ class Constant(Settings):
         return (self.constant,)
 
     def quantile(self, _: float) -> Value:
-        """The value."""
+        """The value, whatever the probability."""
         return self.constant
 
 
 class Uniform(Settings):
-    """Between two limits."""
+    """Uniform between two limits."""
 
     uniform: tuple[float, float] = Field(description="least and greatest value")
 
@@ -66,7 +66,7 @@ class Uniform(Settings):
 
 
 class LogUniform(Settings):
-    """Between two positive limits, uniform in the logarithm."""
+    """Uniform in the logarithm between two positive limits."""
 
     log_uniform: tuple[float, float] = Field(description="least and greatest value, above 0")
 
@@ -74,7 +74,7 @@ class LogUniform(Settings):
     def _ordered(self):
         low, high = self.log_uniform
         if not 0.0 < low <= high:
-            raise ValueError(f"log_uniform = {[low, high]}: two numbers above 0 in rising order are wanted")
+            raise ValueError(f"log_uniform = {[low, high]}: expected two numbers above 0 in rising order")
         return self
 
     def limits(self) -> tuple[Value, ...]:
@@ -121,7 +121,7 @@ class Normal(Settings):
 
 
 class Choice(Settings):
-    """One of several."""
+    """One of several values."""
 
     choice: tuple[Value, ...] = Field(min_length=1)
     weights: tuple[float, ...] | None = Field(default=None, description="relative, one for each; None: equal")
@@ -131,7 +131,7 @@ class Choice(Settings):
         w = self.weights
         if w is not None and (len(w) != len(self.choice) or min(w) < 0.0 or sum(w) <= 0.0):
             raise ValueError(
-                f"weights = {list(w)}: one number from 0 for each of {list(self.choice)} is wanted, not all 0"
+                f"weights = {list(w)}: expected one number from 0 for each of {list(self.choice)}, not all 0"
             )
         return self
 
@@ -173,7 +173,7 @@ def distribution(spec: Any) -> Distribution:
         for kind, cls in KINDS.items():
             if kind in spec:
                 return cls(**spec)
-    raise InputError(f"{spec!r} is no distribution; a value or one of {choices(KINDS)} is wanted.")
+    raise InputError(f"expected a value or a distribution ({choices(KINDS)}), got {spec!r}.")
 
 
 STRAIGHT, LOGARITHMIC, NORMAL, OTHER = range(4)

@@ -1,4 +1,4 @@
-"""From what a patient wants to what the muscles are told at the end of each control period.
+"""From the motor command of a patient to the excitations of the muscles at the end of each control period.
 
 For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activations a_k of the motor command:
 
@@ -16,7 +16,7 @@ Weakness is of the descending command: reflex and tremor know no ceiling. The fl
 elbow, the extensors by flexion. Tremor alternates between the groups and its phase wanders with
 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of that width at half height.
 
-Signals are linear between control times, and so is the excitation that reaches the muscles. What is wanted is known
+Signals are linear between control times, and so is the excitation that reaches the muscles. The motor command is known
 beforehand and taken at the end of the period; what is felt (error, stretch) is known at its beginning, so that a delay
 shorter than a period counts as one. A patient is a row of numbers (`PATIENT` in patient.py) and an `EffortState`; the
 functions neither allocate nor draw random numbers, so that a batch can run them.
@@ -53,7 +53,7 @@ class EffortState(NamedTuple):
     fatigued: Cleared
     """M_F of each muscle [-], shape (m,)."""
     command: Cleared
-    """Past samples of what is wanted, s a_k [-], a ring of shape (n,) for each muscle, shape (m, n)."""
+    """Past samples of the command times the effort, s a_k [-], a ring of shape (n,) for each muscle, shape (m, n)."""
     drive: Cleared
     """Past samples of d_k [-], shape (m, n)."""
     reflex: Cleared
@@ -69,7 +69,7 @@ def samples_in(period):
 
 
 def new_effort(sign: np.ndarray, period: float) -> EffortState:
-    """The state of somebody who has wanted nothing yet.
+    """The state of a patient before the first command.
 
     Args:
         sign: +1 for a flexor, -1 for an extensor, shape (m,).
@@ -103,7 +103,7 @@ def felt(ring, k, newest, delay, period):
 
 @compiled
 def intended(par, state, period, k):
-    """c_k [-]."""
+    """Intended activation c_k [-]."""
     newest = int(state.present[PRESENT.newest])
     command = delayed(state.command, k, newest, par[PATIENT.neural_delay] / period)
     error = felt(state.error, 0, newest, par[PATIENT.feedback_delay], period)
@@ -118,7 +118,7 @@ def largest_activation(par, sign):
 
 @compiled
 def wanted_share(par, state, period, k):
-    """T_k [-]."""
+    """Wanted share T_k [-]."""
     others = 0.0
     if par[PATIENT.co_contraction] > 0.0:
         count = 0
@@ -135,7 +135,7 @@ def wanted_share(par, state, period, k):
 
 @compiled
 def voluntary_drive(par, state, k, share):
-    """What weakness and fatigue leave of a wanted share [-]."""
+    """Voluntary drive: the part of a wanted share that weakness and fatigue leave [-]."""
     return largest_activation(par, state.sign[k]) * min(share, 1.0 - state.fatigued[k])
 
 
@@ -163,7 +163,7 @@ def start_excitation(state, k):
 
 @compiled
 def remember(par, state, wanted, error, rate):
-    """Takes the samples of a new period into the memories; `rate` is that of the elbow [rad/s]."""
+    """Put the samples of a new period into the memories; `rate` is that of the elbow [rad/s]."""
     present = state.present
     newest = (int(present[PRESENT.newest]) + 1) % state.error.shape[1]
     present[PRESENT.newest] = newest
@@ -177,7 +177,7 @@ def remember(par, state, wanted, error, rate):
 
 @compiled
 def step_effort(par, state, period, wanted, error, rate, noise, out):
-    """One control period of one patient.
+    """Do one control period of one patient.
 
     Args:
         par: numbers of the patient, at the places of PATIENT.
@@ -185,7 +185,7 @@ def step_effort(par, state, period, wanted, error, rate, noise, out):
         period: control period [s].
         wanted: activations of the motor command at the end of the period [-], shape (m,).
         error: psi - theta at its beginning [rad].
-        rate: of the elbow at its beginning, flexion positive [rad/s].
+        rate: rate of the elbow at its beginning, flexion positive [rad/s].
         noise: a standard normal number for the tremor.
         out: excitations at the end of the period [-], shape (m,).
     """

@@ -25,7 +25,7 @@ LONGEST_STEP = 0.02
 
 @compiled
 def fatigue_rates(active, fatigued, wanted, fatigue_rate, recovery_rate):
-    """(M_A', M_F') [1/s]."""
+    """Rates M_A' and M_F' of the active and the fatigued share [1/s]."""
     missing = wanted - active
     if missing > 0.0:
         missing = min(missing, 1.0 - active - fatigued)

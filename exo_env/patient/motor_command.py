@@ -1,4 +1,4 @@
-"""What the subject's muscles are told: static optimisation on the subject's own internal model.
+"""The motor command of a subject: static optimisation on the subject's own internal model.
 
 The subject knows its arm and the load it expects in the hand over the gym rope, not the device that it wears. Along
 the reference psi(t) the elbow needs
@@ -33,7 +33,7 @@ from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.patient.static_optimisation import ArmTable, LoadTable, muscle_moment, needed_moment, planned
 
 Course = Callable[[float], tuple[float, float, float]]
-"""t [s] -> (psi [rad], its rate [rad/s], its acceleration [rad/s^2])."""
+"""A function from a time [s] to psi [rad], its rate [rad/s] and its acceleration [rad/s^2]."""
 INTERVAL = 0.02
 """Time between samples of the command [s]; far below the time constants of muscles and the movement."""
 SWEEPS = 100
@@ -50,7 +50,7 @@ class MotorCommand:
     """Activations that the subject wants along a movement."""
 
     times: np.ndarray
-    """[s], shape (n,)."""
+    """Times of the command [s], shape (n,)."""
     activations: np.ndarray
     """Wanted activations before scaling [-], shape (n, m), in the order of `muscles`."""
     moment: np.ndarray
@@ -58,17 +58,24 @@ class MotorCommand:
     shortage: float
     """Largest moment that the muscles cannot give even at their limits [Nm]."""
     muscles: tuple[str, ...]
-    """Names, shape (m,)."""
+    """Names of the muscles, shape (m,)."""
 
     def excitations(self, maximum: float) -> dict[str, Spline]:
-        """Course of each muscle's excitation at a maximum activation of 0 to 1."""
+        """Excitation of each muscle over time.
+
+        Args:
+            maximum: maximum activation of the subject, 0 to 1 [-].
+
+        Raises:
+            InputError: it is no number from 0 to 1.
+        """
         if not 0.0 <= maximum <= 1.0:
-            raise InputError(f"maximum activation = {maximum}; a number from 0 to 1 is wanted.")
+            raise InputError(f"maximum activation = {maximum}: expected a number from 0 to 1.")
         scaled = np.maximum(maximum * self.activations, MINIMUM)
         return {m: Spline(times=tuple(self.times), values=tuple(scaled[:, k])) for k, m in enumerate(self.muscles)}
 
     def start_activation(self, maximum: float) -> dict[str, float]:
-        """Activation of each muscle at the start."""
+        """Activation of each muscle at the start [-], at a maximum activation of 0 to 1."""
         return {m: float(max(maximum * self.activations[0, k], MINIMUM)) for k, m in enumerate(self.muscles)}
 
 
@@ -79,16 +86,16 @@ class InternalModel:
     arm: ArmTable
     load: LoadTable
     muscles: tuple[str, ...]
-    """Names, in the order of the arm's table."""
+    """Names of the muscles, in the order of the arm's table."""
 
     @classmethod
     def of(cls, arm: Arm, machine: GymMachine, expected_load: float) -> InternalModel:
-        """Of a subject.
+        """The internal model of a subject.
 
         Args:
-            arm: its own arm.
+            arm: the subject's own arm.
             machine: the gym machine.
-            expected_load: mass of the weight that it expects [kg].
+            expected_load: mass of the weight that the subject expects [kg].
         """
         return cls(arm_table(arm), load_table(arm, machine, expected_load), arm.muscles)
 
@@ -117,7 +124,7 @@ def arm_table(arm: Arm) -> ArmTable:
 
 
 def load_table(arm: Arm, machine: GymMachine, expected_load: float) -> LoadTable:
-    """What the arm carries, for the compiled iteration."""
+    """The load of the arm, for the compiled iteration."""
     forearm, handle = arm.segments["forearm"], machine.handle
     return LoadTable(
         inertia=arm.inertia_about_elbow(),
@@ -137,7 +144,10 @@ def plan(model: InternalModel, reference: Course, duration: float) -> MotorComma
     Args:
         model: what the subject knows.
         reference: the movement.
-        duration: of the movement [s].
+        duration: length of the movement [s].
+
+    Raises:
+        SimulationError: the iteration between tendon strain and activation does not settle.
     """
     times = np.linspace(0.0, duration, round(duration / INTERVAL) + 1)
     return plan_course(model, times, np.array([reference(t) for t in times]))
@@ -148,7 +158,7 @@ def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> 
 
     Args:
         model: what the subject knows.
-        times: evenly spaced [s], shape (n,).
+        times: evenly spaced times [s], shape (n,).
         course: psi [rad], its rate [rad/s] and its acceleration [rad/s^2], shape (n, 3).
 
     Raises:
@@ -168,6 +178,6 @@ def unsettled(left: float, duration: float) -> SimulationError:
     """The error of a command that does not settle in a movement of that duration [s]."""
     return SimulationError(
         f"the motor command does not settle: after {SWEEPS} iterations between tendon strain and activation an "
-        f"activation may still be wrong by {left:.3g}; below {SETTLED:g} is wanted. Check the person's muscles and "
+        f"activation may still be wrong by {left:.3g}, expected less than {SETTLED:g}. Check the person's muscles and "
         f"the movement of {duration:.4g} s."
     )

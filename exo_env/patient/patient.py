@@ -2,30 +2,8 @@
 
 The defaults are the paper's subject: arm26, full activation, nothing delayed, nothing impaired. `effort.py` tells
 how each number acts; configs/patients says how it is distributed. The source of each range stands in the field's
-description as one of these labels, or as the word "assumed"; a range is a limit of what is accepted, not a
-distribution.
-
-    [Bazzucchi 2006]  Muscle Nerve, doi:10.1002/mus.20462: antagonist activity of biceps and triceps in elbow movements
-    [Bowden 2014]     Front. Neurol. 5:239: elbow flexor torque and voluntary activation after stroke
-    [Canning 1999]    Arch. Phys. Med. Rehabil. 80:66-70: elbow torque after stroke, its size and its rate
-    [Cavanagh 1979]   Eur. J. Appl. Physiol. 42:159-163: electromechanical delay of the elbow flexors
-    [Deuschl 2022]    Clin. Neurophysiol., doi:10.1016/j.clinph.2022.01.004: investigation of tremor
-    [Elble 2000]      Neurology 55:1547-1551: frequency of essential tremor
-    [Emken 2007]      J. Neurophysiol. 97:3997-4006: motor adaptation as greedy optimisation of error and effort
-    [Frey-Law 2012]   J. Biomech. 45:1803-1808: fatigue and recovery rates of six joints
-    [Hammond 1955]    J. Physiol. 127:23P: latency of the biceps' response to a pull
-    [Lance 1980]      in Feldman, Young, Koella (eds), Spasticity: disordered motor control, 485-494: its definition
-    [Looft 2018]      J. Biomech. 77:16-25: recovery multiplier at rest
-    [McPherson 2018]  Exp. Brain Res. 237:121-135: elbow stretch reflex in hemiparesis, stretches of 15 to 150 deg/s
-    [Mercier 2004]    Clin. Rehabil. 18:215-221: relative strength of five muscle groups of the paretic arm
-    [Rakshit 2021]    doi:10.1016/j.jbiomech.2021.110695: fatigue and recovery rates by muscle group and sex
-    [Smith 2018]      J. Neurophysiol., doi:10.1152/jn.00700.2017: force decays while the shown error is held at zero
-    [Wolbrecht 2008]  IEEE Trans. Neural Syst. Rehabil. Eng. 16:286-297: people after stroke let the robot do the work
-
-Most of these numbers stand in the abstracts. Not checked against the papers themselves: the elbow's rates of
-[Frey-Law 2012], which lie between those of ankle and shoulder in its abstract, the latency of [Hammond 1955], the
-forgetting factors of [Emken 2007] and the time constants of [Smith 2018], of which the abstracts give the laws without
-numbers; the rates of [Rakshit 2021] are those that MyoSuite quotes from it.
+description as a label such as [Canning 1999], which sources.py explains, or as the word "assumed"; a range is a limit
+of what is accepted, not a distribution.
 """
 
 from __future__ import annotations
@@ -162,7 +140,7 @@ class Patient(Person):
 
     @property
     def person(self) -> Person:
-        """Body of the patient."""
+        """The body of the patient, without what is impaired."""
         return Person(**{name: getattr(self, name) for name in Person.model_fields})
 
     def time_constants(self, arm: Arm) -> dict[str, float]:
@@ -192,5 +170,5 @@ SHOWN = traits_of(Patient, "effort") + traits_of(Patient, "size") + traits_of(Pa
 
 def fields_of(row: Iterable[float]) -> dict[str, Any]:
     """Fields of a patient from its row of numbers."""
-    found: dict[str, Any] = dict(zip(FIELDS, map(float, row), strict=True))
-    return found | {"sex": SEXES[int(found["sex"])]}
+    fields: dict[str, Any] = dict(zip(FIELDS, map(float, row), strict=True))
+    return fields | {"sex": SEXES[int(fields["sex"])]}

@@ -56,10 +56,10 @@ class Population(Settings):
     @model_validator(mode="after")
     def _possible(self):
         if bool(self.mixture) == bool(self.fields or self.base):
-            raise ValueError("either fields (with or without a base) or a mixture is wanted")
+            raise ValueError("expected either fields, with or without a base, or a mixture")
         if self.mixture:
             if min(self.mixture.values()) < 0.0 or sum(self.mixture.values()) <= 0.0:
-                raise ValueError(f"mixture = {self.mixture}: weights from 0, not all 0, are wanted")
+                raise ValueError(f"mixture = {self.mixture}: expected weights from 0, not all 0")
             _ = self.parts
         else:
             self._check_fields()
@@ -95,12 +95,12 @@ class Population(Settings):
 
     @cached_property
     def parts(self) -> tuple[Population, ...]:
-        """The mixed populations."""
+        """Populations of a mixture, in the order of their weights."""
         return tuple(Population.shipped(name) for name in self.mixture)
 
     @cached_property
     def distributions(self) -> dict[str, Distribution]:
-        """Of each field, in the order in which `Patient` declares them, whatever the order in the file."""
+        """Distribution of each field, in the order in which `Patient` declares them, whatever the order in the file."""
         given, order = self.fields_in_full, list(Patient.model_fields)
         # A body mass index needs the height, which is declared after the body mass.
         names = sorted(given, key=lambda k: (_patient_field(k) == "body_mass", order.index(_patient_field(k))))
@@ -113,7 +113,7 @@ class Population(Settings):
             return self.fields
         under, here = Population.shipped(self.base), {_patient_field(name) for name in self.fields}
         if under.mixture:
-            raise InputError(f"base = '{self.base}' is a mixture; a population with fields is wanted.")
+            raise InputError(f"base = '{self.base}' is a mixture; expected a population with fields.")
         return {k: v for k, v in under.fields_in_full.items() if _patient_field(k) not in here} | self.fields
 
     def sample(self, source: np.random.Generator | int) -> Patient:
@@ -127,10 +127,10 @@ class Population(Settings):
         return Patient.of_row(self.draw(np.uint64(key)))
 
     def draw(self, key: np.uint64, level: int = 0) -> np.ndarray:
-        """As `sample`, the patient as `Patient.row` gives it; what is checked of a population holds for all of these.
+        """Row of a patient, as `Patient.row` gives it; see `sample`.
 
         Args:
-            key: of the episode.
+            key: key of the random streams.
             level: how many mixtures this population is a part of.
         """
         if self.mixture:
@@ -145,7 +145,7 @@ class Population(Settings):
 
     @cached_property
     def _defaults(self) -> np.ndarray:
-        """Of the traits that are not named."""
+        """Row of a healthy patient, which gives the traits that are not named."""
         return Patient().row()
 
     @cached_property
@@ -159,7 +159,7 @@ class Population(Settings):
         return Draws({f"patient.{name}": d for name, d in fields.items()}), np.array([FIELDS.index(x) for x in fields])
 
     def _check_fields(self) -> None:
-        """Every field given once, and possible at the ends of its distribution.
+        """Refuse a field that is missing, or that no patient can have at an end of its distribution.
 
         Raises:
             InputError: names key and value.
@@ -169,7 +169,7 @@ class Population(Settings):
             if name not in known:
                 raise InputError(f"fields: unknown key '{name}'. Allowed: {choices(known)}.")
         if {BODY_MASS_INDEX, "body_mass"} <= self.fields.keys():
-            raise InputError(f"fields: body_mass and {BODY_MASS_INDEX} are both given; one of them is wanted.")
+            raise InputError(f"fields: body_mass and {BODY_MASS_INDEX} are both given; expected one of them.")
         found = self.distributions
         given = {*map(_patient_field, found), *neutral_traits(Patient)}
         missing = [name for name in Patient.model_fields if name not in given]
@@ -195,7 +195,7 @@ Source = str | Mapping[str, Any] | Patient | Population
 
 
 def population(source: Source) -> Population:
-    """Whom to draw from: a shipped population by name, a YAML file, a population or patient, or either as a dict.
+    """The population that a source stands for: a name, a YAML file, a population or patient, or either as a dict.
 
     A single patient is a population of which every draw is that patient.
 
@@ -213,13 +213,13 @@ def population(source: Source) -> Population:
             return Population(**source)
         return population(Patient(**source))
     raise InputError(
-        f"patient = {source!r}; a population ({choices(shipped_populations())}), a YAML file, or a mapping of the "
-        "fields of a patient is wanted."
+        f"patient = {source!r}: expected a population ({choices(shipped_populations())}), a YAML file, or a mapping of "
+        "the fields of a patient."
     )
 
 
 def read_shipped(name: str) -> Mapping[str, Any]:
-    """What the file of a shipped population holds."""
+    """Contents of the file of a shipped population."""
     return read_yaml(configs() / FOLDER / f"{name}.yaml")
 
 
@@ -259,7 +259,7 @@ def _patient(values: dict[str, Any]) -> Patient:
 
 
 def _checked(name: str, value: Any, fields: dict[str, Any]) -> None:
-    """Refuses a value that no patient can have."""
+    """Refuse a value that no patient can have."""
     try:
         _patient(fields)
     except (InputError, TypeError) as error:

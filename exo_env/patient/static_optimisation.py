@@ -32,24 +32,24 @@ class ArmTable(NamedTuple):
     moving: np.ndarray
     """True for a point of the forearm, False for one of the ground, shape (n,)."""
     points: np.ndarray
-    """In the frame of the forearm or in ground axes [m], shape (n, 3)."""
+    """Points of the paths in the frame of the forearm or in ground axes [m], shape (n, 3)."""
     axis: np.ndarray
-    """Of the elbow [-], shape (3,)."""
+    """Axis of the elbow [-], shape (3,)."""
     elbow: np.ndarray
     """Centre of the elbow [m], shape (3,)."""
 
 
 class LoadTable(NamedTuple):
-    """What the forearm carries."""
+    """Forearm, handle and weight, which the muscles carry."""
 
     inertia: float
-    """Of the forearm about the elbow [kg m^2]."""
+    """Inertia of the forearm about the elbow [kg m^2]."""
     mass: float
-    """Of the forearm [kg]."""
+    """Mass of the forearm [kg]."""
     centre_of_mass: np.ndarray
-    """Of the forearm in its frame [m], shape (3,)."""
+    """Centre of mass of the forearm in its frame [m], shape (3,)."""
     grip: np.ndarray
-    """In the forearm's frame [m], shape (3,)."""
+    """Centre of the grip in the forearm's frame [m], shape (3,)."""
     handle: float
     """Mass of the handle [kg]."""
     weight: float
@@ -57,7 +57,7 @@ class LoadTable(NamedTuple):
     pulley: np.ndarray
     """Low pulley in ground axes [m], shape (3,)."""
     gravity: np.ndarray
-    """In ground axes [m/s^2], shape (3,)."""
+    """Gravity in ground axes [m/s^2], shape (3,)."""
 
 
 @compiled
@@ -249,7 +249,7 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
     Args:
         arm: an ArmTable.
         load: a LoadTable.
-        interval: between samples [s].
+        interval: time between samples [s].
         course: psi, its rate and its acceleration, shape (n, 3).
         sweeps: largest number of iterations.
         relaxation: share of a new tendon force that an iteration takes over; the first takes all.
@@ -284,15 +284,15 @@ def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, ac
 
 
 @compiled
-def drawn(table, rows, interval, period, out):
-    """Linear interpolation of a table in time.
+def interpolated(table, rows, interval, period, out):
+    """Fill `out` by linear interpolation of a table in time.
 
     Args:
         table: values, shape (k, m).
         rows: row that holds at each multiple of the interval, shape (n,).
-        interval: [s].
-        period: from one row of `out` to the next [s].
-        out: shape (p, m).
+        interval: time between two samples of the table [s].
+        period: time from one row of `out` to the next [s].
+        out: filled, shape (p, m).
     """
     last = rows.shape[0] - 1
     for k in range(out.shape[0]):

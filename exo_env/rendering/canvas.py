@@ -25,7 +25,7 @@ DESIGN = 480.0
 FINER = 2
 """Fine pixels per pixel of the result, along a side: the averages smooth all edges."""
 FONT_HEIGHTS = {"small": 14, "normal": 16}
-"""Of the words, in lengths of the layout."""
+"""Heights of the words, in lengths of the layout."""
 PROMPT = "PYGAME_HIDE_SUPPORT_PROMPT"
 
 
@@ -68,7 +68,7 @@ class Canvas:
         self._fonts = {k: self.pygame.font.Font(None, max(round(h * self.zoom), 6)) for k, h in FONT_HEIGHTS.items()}
 
     def clear(self, colour: Colour) -> None:
-        """Begin a picture."""
+        """Begin a picture: fill the square with a colour."""
         self._fine.fill(colour)
 
     def polygon(self, outline: np.ndarray, colour: Colour, edge: Colour | None = None, width: float = 0.0) -> None:

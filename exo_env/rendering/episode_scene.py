@@ -23,7 +23,7 @@ def scene_of(now: Readout, label: str) -> Scene:
 
     Args:
         now: readings of the episode that is shown.
-        label: names the patient.
+        label: words that name the patient.
     """
     episode, angle, hinge = now.episode, now.sensor("elbow_angle.angle"), now.sensor("exo_angle.angle")
     psi = float(now.world.tables.plan.course[now.world.tables.status[STATUS.step], 0])

@@ -11,11 +11,11 @@ from dms_core.errors import DmsError, extra
 from dms_core.output_file import check_writable
 
 RESOLUTION = 150
-"""[dots per inch]"""
+"""Resolution of the figures [dots per inch]."""
 
 
 def require_matplotlib() -> None:
-    """Say so before a long run where a figure could not be drawn.
+    """Refuse a run whose figures could not be drawn, before it begins.
 
     Raises:
         DmsError: matplotlib is missing.
@@ -42,7 +42,7 @@ def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) ->
 
 
 def legend(figure: Any, ax: Any, columns: int) -> None:
-    """Of the curves in `ax`, above the panels and never on a curve."""
+    """Name the curves in `ax` above the panels, never on a curve."""
     handles, labels = ax.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False, fontsize=8)
 

@@ -23,9 +23,9 @@ STEEL, STEEL_EDGE, STEEL_LIGHT = (112, 124, 140), (58, 66, 78), (236, 239, 243)
 ROPE, IRON = (92, 98, 108), (66, 72, 82)
 REFERENCE = (0, 140, 105)
 ACTIVATION: tuple[Colour, ...] = ((36, 88, 200), (146, 66, 158), (220, 28, 40))
-"""Of muscles, from activation 0 to 1: blue, purple, red."""
+"""Colours of muscles, from activation 0 to 1: blue, purple, red."""
 TENSION: tuple[Colour, ...] = ((196, 200, 206), (244, 180, 48), (190, 72, 0))
-"""Of the device's ropes, from slack to FULL_TENSION and beyond: grey, yellow, brown."""
+"""Colours of the device's ropes, from slack to FULL_TENSION and beyond: grey, yellow, brown."""
 FULL_TENSION = 200.0
 """End of the scale of tensions [N], the same in all pictures: the largest of the action mode rope_tension."""
 WINDOW = 2.8
@@ -53,13 +53,13 @@ def gradient(colours: Sequence[Colour], share: float) -> Colour:
 
 
 def darker(colour: Colour) -> Colour:
-    """For the edge of a shape."""
+    """A darker colour, for the edge of a shape."""
     red, green, blue = colour
     return 11 * red // 20, 11 * green // 20, 11 * blue // 20
 
 
 def lighter(colour: Colour) -> Colour:
-    """For the part of a shape that the light falls on."""
+    """A lighter colour, for the part of a shape that the light falls on."""
     red, green, blue = colour
     return red + (255 - red) // 4, green + (255 - green) // 4, blue + (255 - blue) // 4
 
@@ -70,14 +70,14 @@ def tension_share(tension: float) -> float:
 
 
 class View(NamedTuple):
-    """Maps metres to fine pixels."""
+    """A map from metres to fine pixels."""
 
     scale: float
-    """[fine pixel/m]"""
+    """Scale of the picture [fine pixel/m]."""
     x: float
-    """Of the left edge of the canvas [m]."""
+    """Place of the left edge of the canvas [m]."""
     y: float
-    """Of its upper edge [m]."""
+    """Place of its upper edge [m]."""
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Points [m] in fine pixels, same shape."""
@@ -130,7 +130,7 @@ class Picture:
         self.canvas.polygon(rounded(view(corners)), TORSO)
 
     def _arm(self, view: View, scene: Scene, upper_arm: float) -> None:
-        """Upper arm, forearm and hand."""
+        """Draw upper arm, forearm and hand."""
         r = view.scale * upper_arm
         shoulder, elbow, grip = view(scene.shoulder), view(scene.elbow), view(scene.grip)
         belly, wrist, knuckles = (elbow + share * (grip - elbow) for share in (0.24, 0.80, 0.94))

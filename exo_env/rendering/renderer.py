@@ -33,9 +33,9 @@ class Renderer:
         if mode not in get_args(RenderMode):
             raise InputError(f"render mode '{mode}' is unknown. Known: {', '.join(get_args(RenderMode))}.")
         if fps <= 0:
-            raise InputError(f"fps = {fps}: a positive number of pictures per second is wanted.")
+            raise InputError(f"fps = {fps}: expected a number above 0, of pictures per second.")
         if size < SMALLEST:
-            raise InputError(f"size = {size}: at least {SMALLEST} pixels are wanted.")
+            raise InputError(f"size = {size}: expected at least {SMALLEST} pixels.")
         self.mode: RenderMode = mode
         self.fps, self.size = fps, size
         self._canvas = Canvas(size)

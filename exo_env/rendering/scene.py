@@ -42,13 +42,13 @@ class Scene:
     error_deg: float
     """Elbow flexion minus reference [deg]."""
     muscle_moment: float
-    """Of the muscles about the elbow, flexion positive [Nm]."""
+    """Moment of the muscles about the elbow, flexion positive [Nm]."""
     device_moment: float
-    """Of the device's ropes about its hinge, flexion positive [Nm]."""
+    """Moment of the device's ropes about its hinge, flexion positive [Nm]."""
     effort: float
     """What the patient intends, as a multiple of what was planned [-]."""
     label: str = ""
-    """Names the patient."""
+    """Words that name the patient."""
     weight: np.ndarray | None = None
     """Centre of the weight [m], shape (2,)."""
     weight_mass: float | None = None
@@ -56,4 +56,4 @@ class Scene:
     pulleys: tuple[np.ndarray, ...] = ()
     """Pulleys of the gym machine [m], each of shape (2,)."""
     gym_rope: np.ndarray | None = None
-    """From the grip over the end of the handle and the pulleys to the weight [m], shape (n, 2), n >= 3."""
+    """Gym rope from the grip over the end of the handle and the pulleys to the weight [m], shape (n, 2), n >= 3."""

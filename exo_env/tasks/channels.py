@@ -37,20 +37,20 @@ class Parts:
 
 @dataclass(frozen=True)
 class Reading:
-    """True numbers under a name."""
+    """One or several true numbers under a name."""
 
     name: str
     unit: str
     labels: tuple[str, ...] = ("",)
-    """One a component."""
+    """One label for each component."""
     sensors: tuple[str, ...] = ()
-    """Components of the model's sensors that are copied, one a component; none: the task's kernel puts the numbers."""
+    """Components of the model's sensors that are copied, one for each component; none: the task's kernel fills it."""
     trait: str | None = None
-    """The patient's trait that it is."""
+    """Name of the patient's trait that the reading is, None where it is none."""
 
 
 class Imperfection(Settings):
-    """What separates a channel from the truth."""
+    """Noise, delay and quantum that separate a channel from the truth."""
 
     deviation: float = Field(default=0.0, ge=0.0, description="standard deviation of white noise [unit of the channel]")
     delay: float = Field(default=0.0, ge=0.0, le=0.5, description="[s]; linear between two control periods")
@@ -59,22 +59,23 @@ class Imperfection(Settings):
 
 @dataclass(frozen=True)
 class Channel:
-    """How a reading is shown."""
+    """How a reading is shown to an agent."""
 
     name: str
     scale: float
     """Value in the reading's unit that is shown as 1."""
     low: float
-    """Range of the sensor [unit of the reading]."""
+    """Least value that is shown [unit of the reading]."""
     high: float
+    """Greatest value that is shown [unit of the reading]."""
     imperfection: Imperfection = Imperfection()
-    """Unless the user says otherwise."""
+    """Imperfection that the channel has unless the user gives another."""
     reading: str | None = None
     """Name of the reading; None: that of the channel."""
 
     @property
     def source(self) -> str:
-        """Name of the reading."""
+        """Name of the reading that is shown."""
         return self.reading or self.name
 
 
@@ -96,7 +97,7 @@ class Slice:
     """Greatest value shown [unit]."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The fields as a dict, for JSON."""
         return asdict(self)
 
 

@@ -54,7 +54,7 @@ ELBOW = places(_NAMES)
 
 
 def device_channels() -> list[Channel]:
-    """What a worn device measures of itself.
+    """Channels of what a worn device measures of itself.
 
     Noise, assumed: an encoder of 12 bits, its filtered difference, rope and guide force sensors of half a per cent.
     """
@@ -67,7 +67,7 @@ def device_channels() -> list[Channel]:
 
 
 def action_channel() -> Channel:
-    """The action before."""
+    """Channel of the last action."""
     return Channel("last_action", 1.0, -1.0, 1.0)
 
 
@@ -77,7 +77,7 @@ def emg_channels() -> list[Channel]:
 
 
 def privileged_channels() -> list[Channel]:
-    """What only a simulation knows of the patient."""
+    """Channels of what only a simulation knows of the patient."""
     return [
         *trait_channels(),
         Channel("load", 1.0, 0.0, 50.0),
@@ -90,7 +90,7 @@ def privileged_channels() -> list[Channel]:
 
 @compiled
 def device_share(muscles, device):
-    """What the device carries of the moment [Nm] that both give, from 0 to 1 [-]."""
+    """Share of the device in the moment of muscles and device, from 0 to 1 [-]; both are given in Nm."""
     both = muscles + device
     if both == 0.0:
         return 0.0

@@ -25,8 +25,8 @@ from exo_env.tasks.repetition import Repetitions
 from exo_env.tasks.rewards import Weights, term_values
 from exo_env.tasks.task import (
     NOTHING,
+    Reported,
     Task,
-    Told,
     Values,
     end_with,
     event_of,
@@ -43,16 +43,17 @@ PREVIEW = (0.1, 0.2, 0.4)
 
 
 def lift_readings(parts: Parts) -> list[Reading]:
-    """Those of the elbow, and the reference some time ahead."""
+    """The readings of every elbow task, and the reference some time ahead."""
     return [*elbow_readings(parts), Reading("preview", "rad", tuple(f"in {t} s" for t in PREVIEW))]
 
 
 LIFT = places(reading.name for reading in lift_readings(Parts((), (), ())))
+"""Place of each reading in the list of `lift_readings`."""
 
 
 @compiled
 def _read(w):
-    """The elbow's readings and the preview."""
+    """Fill the readings of every elbow task, and the preview."""
     read_elbow(w)
     r, at, preview, k = readings(w), first_of(w), matrix(inner(w, WORLD.plan), PLAN.preview), step_of(w)
     for i in range(preview.shape[1]):
@@ -61,7 +62,7 @@ def _read(w):
 
 @compiled
 def _judge(w):
-    """Limits, then the reward terms of rewards.py."""
+    """Check the limits, then fill the reward terms of rewards.py."""
     r, at, plan, drive = readings(w), first_of(w), inner(w, WORLD.plan), inner(w, WORLD.drive)
     reaction = r[at[ELBOW.reaction]]
     tensions = r[at[ELBOW.tension] : at[ELBOW.muscle_moment]]
@@ -75,7 +76,7 @@ def _judge(w):
 
 
 class LiftTask(Task):
-    """Follow the reference, let the patient do what the patient can, end nothing early."""
+    """The task: follow the reference, and let the patient do what the patient can."""
 
     weights_type: ClassVar[type[Settings]] = Weights
     limits_type: ClassVar[type[Settings]] = Limits
@@ -83,20 +84,20 @@ class LiftTask(Task):
     limits: Limits
     events: ClassVar[tuple[str, ...]] = EVENTS
     preview: ClassVar[tuple[float, ...]] = PREVIEW
-    told: ClassVar[tuple[Told, ...]] = (
-        Told("tracking_error_deg", "error", 180.0 / math.pi),
-        Told("device_share", "device_share"),
-        Told("effort", "effort"),
-        Told("elbow_reaction", "reaction"),
+    reported: ClassVar[tuple[Reported, ...]] = (
+        Reported("tracking_error_deg", "error", 180.0 / math.pi),
+        Reported("device_share", "device_share"),
+        Reported("effort", "effort"),
+        Reported("elbow_reaction", "reaction"),
     )
     read, judge = _read, _judge
 
     def declared_readings(self, parts: Parts) -> list[Reading]:
-        """See lift_readings."""
+        """The readings of `lift_readings`."""
         return lift_readings(parts)
 
     def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
-        """What a device can measure with the reference beside it, EMG, and what only a simulation knows."""
+        """Three groups: what a device measures, with the reference; EMG; and what only a simulation knows."""
         reference = [
             Channel("reference", 1.0, -0.5, 3.0),
             Channel("reference_rate", 1.0, -20.0, 20.0),
@@ -109,10 +110,10 @@ class LiftTask(Task):
         }
 
     def start_range(self) -> tuple[float, float]:
-        """Within the limits of the elbow [deg]."""
+        """The limits of the elbow [deg]."""
         return self.limits.lowest_deg, self.limits.highest_deg
 
     def sentence(self, event: str, values: Values) -> str:
-        """The limit that was passed."""
+        """A sentence on the limit that was passed."""
         angle, reaction = float(values("angle")[0]), float(values("reaction")[0])
         return limit_sentence(event, self.limits, angle, float(values("tension").max()), reaction)

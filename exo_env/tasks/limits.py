@@ -17,7 +17,7 @@ ANGLE, TENSION, REACTION = range(FIRST_EVENT, FIRST_EVENT + len(EVENTS))
 
 
 class Limits(Settings):
-    """Beyond these an episode is over."""
+    """Limits beyond which an episode is over."""
 
     lowest_deg: float = Field(
         default=0.0, ge=-10.0, le=90.0, description="elbow angle [deg]; a straight arm, where the elbow's bones meet"
@@ -38,7 +38,7 @@ class Limits(Settings):
         return self
 
     def numbers(self) -> np.ndarray:
-        """For compiled code: angles [rad], tension and reaction [N]."""
+        """Limits for compiled code: angles [rad], tension and reaction [N], shape (4,)."""
         return np.array([math.radians(self.lowest_deg), math.radians(self.highest_deg), self.tension, self.reaction])
 
 
@@ -47,9 +47,9 @@ def exceeded(limits, angle, tensions, reaction):
     """Code of the limit that is exceeded, or NOTHING.
 
     Args:
-        limits: `Limits.numbers`.
-        angle: of the elbow [rad].
-        tensions: of the ropes [N], shape (n,).
+        limits: numbers of `Limits.numbers`.
+        angle: angle of the elbow [rad].
+        tensions: tensions of the ropes [N], shape (n,).
         reaction: size of the elbow's reaction force [N].
     """
     if not limits[0] <= angle <= limits[1]:
@@ -65,9 +65,9 @@ def limit_sentence(event: str, limits: Limits, angle: float, tension: float, rea
 
     Args:
         event: one of EVENTS.
-        limits: of this environment.
-        angle: of the elbow [rad].
-        tension: largest of all ropes [N].
+        limits: limits of this environment.
+        angle: angle of the elbow [rad].
+        tension: largest tension of all ropes [N].
         reaction: size of the elbow's reaction force [N].
     """
     if event == "angle":

@@ -83,7 +83,7 @@ class Movement(Settings):
         return np.array([*self._draws.sample(key), *self.episode_numbers(duration)])
 
     def values(self, numbers: np.ndarray) -> dict[str, float]:
-        """The drawn numbers by name."""
+        """The numbers that were drawn, by name."""
         return dict(zip(self.names, numbers.tolist(), strict=False))
 
     @cached_property
@@ -96,7 +96,7 @@ REST = places((START,))
 
 @compiled
 def _stay(w):
-    """psi stays at the start."""
+    """Fill pieces of psi that stay at the start."""
     plan = inner(w, WORLD.plan)
     t, c = floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients)
     c[:] = 0.0
@@ -113,5 +113,5 @@ class Stay(Movement):
 
     @property
     def pieces(self) -> int:
-        """Three, which say the same."""
+        """Three pieces, the fewest that there may be."""
         return 3

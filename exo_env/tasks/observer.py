@@ -1,4 +1,4 @@
-"""An observer: the channels that an agent sees, composed by name, and how well it sees them.
+"""An observer: the channels that an agent sees, chosen by name, and how well it sees them.
 
 What is asked for is a list of groups ("device"), of single channels ("privileged.load"), or of both; a channel that
 stands in two groups may be seen twice, under both names.
@@ -14,35 +14,35 @@ import numpy as np
 from dms_core.errors import InputError, choices
 from exo_env.streams import streams
 from exo_env.tasks.channels import Channel, Imperfection, Reading, Slice, first_places
-from exo_env.tasks.noise import SENSOR
+from exo_env.tasks.noise import IMPERFECTION
 
 
 class Observer:
-    """Turns true readings into observations.
+    """The channels of an observation and their imperfections.
 
     Args:
-        wanted: names of groups, or of single channels as "group.channel".
-        readings: of the task, in the order of its array.
+        observation: names of groups, or of single channels as "group.channel".
+        readings: readings of the task, in the order of its array.
         groups: channels of each group.
-        noise: False for perfect sensors, True for the defaults, or a mapping from a channel, by its name or as
+        noise: False for perfect channels, True for the defaults, or a mapping from a channel, by its name or as
             "group.channel", to an Imperfection that replaces its default.
         period: control period [s].
     """
 
     def __init__(
         self,
-        wanted: Sequence[str],
+        observation: Sequence[str],
         readings: Sequence[Reading],
         groups: Mapping[str, Sequence[Channel]],
         noise: bool | Mapping[str, Any],
         period: float,
     ) -> None:
-        self.channels = _chosen(wanted, groups)
+        self.channels = _chosen(observation, groups)
         self._readings = {r.name: (r, int(place)) for r, place in zip(readings, first_places(readings), strict=False)}
         self.structure = self._slices()
         self.size = self.structure[-1].stop
-        self.sensors = self._sensors(self._imperfections(noise), period)
-        """Rows at the places of noise.SENSOR, shape (size, 7)."""
+        self.imperfections = self._table(self._each(noise), period)
+        """Rows at the places of noise.IMPERFECTION, shape (size, 7)."""
         sources = [
             (self._readings[c.source][1], part) for (_, c), part in zip(self.channels, self.structure, strict=True)
         ]
@@ -52,6 +52,7 @@ class Observer:
         """Random stream of each component's noise, shape (size,)."""
 
     def _slices(self) -> tuple[Slice, ...]:
+        """Where each channel stands in the observation."""
         start, found = 0, []
         for group, c in self.channels:
             reading = self._readings[c.source][0]
@@ -60,7 +61,7 @@ class Observer:
             start = stop
         return tuple(found)
 
-    def _sensors(self, imperfections: Sequence[Imperfection], period: float) -> np.ndarray:
+    def _table(self, imperfections: Sequence[Imperfection], period: float) -> np.ndarray:
         rows = []
         for (_, c), i, part in zip(self.channels, imperfections, self.structure, strict=True):
             delay = i.delay / period
@@ -68,8 +69,12 @@ class Observer:
             rows += [[i.deviation, i.quantum, c.scale, c.low, c.high, whole, delay - whole]] * (part.stop - part.start)
         return np.array(rows, dtype=float)
 
-    def _imperfections(self, noise: bool | Mapping[str, Any]) -> list[Imperfection]:
-        """Of each channel."""
+    def _each(self, noise: bool | Mapping[str, Any]) -> list[Imperfection]:
+        """The imperfection of each channel.
+
+        Raises:
+            InputError: `noise` is of another kind, or names a channel that is not observed.
+        """
         if isinstance(noise, Mapping):
             names = {name for group, c in self.channels for name in (c.name, f"{group}.{c.name}")}
             for name in noise:
@@ -87,27 +92,27 @@ class Observer:
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest observation, shape (size,), float32."""
-        low, high, scale = (self.sensors[:, k] for k in (SENSOR.low, SENSOR.high, SENSOR.scale))
+        low, high, scale = (self.imperfections[:, k] for k in (IMPERFECTION.low, IMPERFECTION.high, IMPERFECTION.scale))
         return (low / scale).astype(np.float32), (high / scale).astype(np.float32)
 
     def memory(self) -> np.ndarray:
-        """For the past readings of one world, shape (depth, size)."""
-        return np.zeros((int(self.sensors[:, SENSOR.whole].max()) + 2, self.size))
+        """Room for the past readings of one world, shape (depth, size)."""
+        return np.zeros((int(self.imperfections[:, IMPERFECTION.whole].max()) + 2, self.size))
 
 
-def _chosen(wanted: Sequence[str], groups: Mapping[str, Sequence[Channel]]) -> list[tuple[str, Channel]]:
+def _chosen(names: Sequence[str], groups: Mapping[str, Sequence[Channel]]) -> list[tuple[str, Channel]]:
     """(group, channel) of what is asked for, in order.
 
     Raises:
         InputError: a name is unknown, stands twice, or nothing is asked for.
     """
-    if isinstance(wanted, str) or not isinstance(wanted, Sequence) or not wanted or len(set(wanted)) < len(wanted):
+    if isinstance(names, str) or not isinstance(names, Sequence) or not names or len(set(names)) < len(names):
         raise InputError(
-            f"observation = {wanted!r}: expected a list of different groups of {choices(groups)}, or of channels as "
+            f"observation = {names!r}: expected a list of different groups of {choices(groups)}, or of channels as "
             "'group.channel'."
         )
     found: list[tuple[str, Channel]] = []
-    for name in wanted:
+    for name in names:
         group, _, single = str(name).partition(".")
         if group not in groups:
             raise InputError(f"observation: group '{group}' is unknown; there are {choices(groups)}.")
@@ -116,5 +121,5 @@ def _chosen(wanted: Sequence[str], groups: Mapping[str, Sequence[Channel]]) -> l
             raise InputError(f"observation: group '{group}' has no channel '{single}'; it has {choices(known)}.")
         found += [(group, c) for c in ([known[single]] if single else groups[group])]
     if len(set(found)) < len(found):
-        raise InputError(f"observation = {list(wanted)!r} asks for a channel twice.")
+        raise InputError(f"observation = {list(names)!r} asks for a channel twice.")
     return found

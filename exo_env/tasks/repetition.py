@@ -46,7 +46,7 @@ class Repetition(Settings):
         if self.start_deg + self.amplitude_deg > HIGHEST + 1e-9:
             raise ValueError(
                 f"start_deg = {self.start_deg} and amplitude_deg = {self.amplitude_deg} lead to "
-                f"{self.start_deg + self.amplitude_deg} deg; at most {HIGHEST} deg are wanted"
+                f"{self.start_deg + self.amplitude_deg} deg, expected at most {HIGHEST} deg"
             )
         return self
 
@@ -62,7 +62,7 @@ class Repetition(Settings):
 
     @property
     def signal(self) -> MinimumJerk:
-        """psi(t) [rad]."""
+        """The reference psi(t) [rad]."""
         low, high = np.radians(self.start_deg), np.radians(self.start_deg + self.amplitude_deg)
         move = (self.duration, self.pause, self.duration)
         rests = [self.rest, *[self.interval - sum(move)] * (self.count - 1)]
@@ -73,25 +73,25 @@ class Repetition(Settings):
 
     @property
     def interval(self) -> float:
-        """From the begin of one to the begin of the next [s]."""
+        """Time from the begin of one repetition to the begin of the next [s]."""
         return max(self.every, self.rest + 2.0 * self.duration + self.pause)
 
     def course(self, times: np.ndarray) -> np.ndarray:
         """psi [rad], its rate [rad/s] and its acceleration [rad/s^2] at times [s] in rising order, shape (n, 3)."""
-        pieces, found = self.signal.pieces(), np.empty((len(times), 3))
-        course_of(pieces.t, pieces.c, np.asarray(times, float), found)
-        return found
+        pieces, course = self.signal.pieces(), np.empty((len(times), 3))
+        course_of(pieces.t, pieces.c, np.asarray(times, float), course)
+        return course
 
 
 MOVEMENT = places(("start_deg", "amplitude_deg", "rest", "duration", "pause", "often", "every"))
 """Place of each field of a repetition in its row of numbers."""
 MOVED = MOVEMENT._fields[: MOVEMENT.often]
-"""Fields that are drawn."""
+"""Names of the fields that are drawn at random."""
 
 
 @compiled
 def put_pieces(movement, t, c):
-    """Pieces of `Repetition.signal`, of a row of numbers in the order of MOVEMENT.
+    """Fill the pieces of `Repetition.signal`, from a row of numbers in the order of MOVEMENT.
 
     Args:
         movement: shape (7,).
@@ -125,7 +125,7 @@ def put_pieces(movement, t, c):
 
 @compiled
 def _put_repetitions(w):
-    """The pieces of a world's movement."""
+    """Fill the pieces of a world's movement."""
     plan = inner(w, WORLD.plan)
     put_pieces(floats(plan, PLAN.movement), floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients))
 
@@ -165,5 +165,5 @@ class Repetitions(Movement):
         return self._count * (rest + 2.0 * move + pause)
 
     def episode_numbers(self, duration: float) -> tuple[float, ...]:
-        """How often it is done, and the time from one begin to the next [s]."""
+        """Number of repetitions, and the time from one begin to the next [s]."""
         return float(self._count), duration / self._count

@@ -37,11 +37,11 @@ from exo_env.settings import Settings
 TRACKING_WIDTH = math.radians(5.0)
 """Error that earns 1/e [rad]."""
 REACTION_THRESHOLD, MOST = 500.0, 2.0
-"""[N], and the largest cost of assistance and reaction [-]."""
+"""Reaction above which it costs [N], and the largest cost of assistance and reaction [-]."""
 
 
 class Weights(Settings):
-    """Factor on each term."""
+    """Weight of each reward term."""
 
     tracking: float = Field(default=1.0, ge=0.0, le=1e6)
     assistance: float = Field(default=0.75, ge=0.0, le=1e6)
@@ -51,7 +51,7 @@ class Weights(Settings):
 
 
 TERM = places(Weights.model_fields)
-"""Place of each term."""
+"""Place of each term in the order of the weights."""
 
 
 @compiled
@@ -60,14 +60,14 @@ def term_values(error, moment, lacking, scale, reaction, action, before, unsafe,
 
     Args:
         error: elbow angle minus reference [rad].
-        moment: of the exoskeleton, flexion positive [Nm].
+        moment: moment of the exoskeleton, flexion positive [Nm].
         lacking: what the patient cannot give, at least 0 [Nm].
         scale: mean moment that the movement needs [Nm].
         reaction: size of the elbow's reaction force [N].
-        action: now, shape (n,).
+        action: the present action, shape (n,).
         before: the action before, shape (n,).
-        unsafe: an event ends the episode.
-        out: shape (len(TERM),).
+        unsafe: whether an event ends the episode.
+        out: the values, filled, shape (len(TERM),).
     """
     change = 0.0
     for i in range(action.shape[0]):

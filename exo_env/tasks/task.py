@@ -7,8 +7,8 @@ them, and two compiled kernels, functions of a packed world w (world/tables.py),
     read(w)      fills the derived readings of the present control time, behind those that sensors give
     judge(w)     fills the value of each term, and sets the event that ends the episode, if there is one
 
-When they are called, readings that name sensors are copied already, and so are traits of the patient; where the solver
-failed, `read` is not called, and `judge` finds the event SOLVER. Readings are found by name:
+When they are called, readings that name sensors are copied already, and so are traits of the patient. Where the solver
+failed, `read` is not called, and `event_of(w)` is SOLVER in `judge`. Kernels take readings by name:
 
     R = places(["angle", "rate"])                      built once, from the names in the order of `readings`
     r, at = readings(w), first_of(w)                   the array, and where each reading begins in it
@@ -37,17 +37,19 @@ from exo_env.world.tables import STATUS, TASK, WORLD
 NOTHING, SOLVER, FIRST_EVENT = range(3)
 """Codes of what ended an episode: nothing, a solver that failed, and the first event of the task's own."""
 Values = Callable[[str], np.ndarray]
-"""Gives the components of a reading by its name."""
+"""A function from the name of a reading to its components."""
 
 
 @dataclass(frozen=True)
-class Told:
-    """A number that `info` of a step tells."""
+class Reported:
+    """A number of `info` of a step, which is a reading in a unit that people like to read."""
 
     name: str
+    """Key in `info`."""
     reading: str
+    """Name of the reading, which has one component."""
     factor: float = 1.0
-    """From the reading's unit to that of the number."""
+    """The number over the reading, such as 180 / pi from radians to degrees."""
 
 
 class Task(ABC):
@@ -68,7 +70,8 @@ class Task(ABC):
     """Names of what ends an episode; their codes begin with FIRST_EVENT."""
     preview: ClassVar[tuple[float, ...]] = ()
     """How far ahead the patient's plan is tabulated for the kernels [s]."""
-    told: ClassVar[tuple[Told, ...]] = ()
+    reported: ClassVar[tuple[Reported, ...]] = ()
+    """Readings that `info` of a step has, beside the reward terms."""
     read: ClassVar[Any]
     judge: ClassVar[Any]
 
@@ -86,11 +89,16 @@ class Task(ABC):
 
     @abstractmethod
     def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
-        """Channels of each group."""
+        """Channels of each group of observations, by the group's name."""
 
     @abstractmethod
     def sentence(self, event: str, values: Values) -> str:
-        """What is said of an event, with the readings of its time."""
+        """A sentence for people on an event.
+
+        Args:
+            event: one of `events`.
+            values: the readings at the time of the event.
+        """
 
     def start_range(self) -> tuple[float, float]:
         """Elbow angles at which an episode may begin [deg]."""
@@ -102,18 +110,18 @@ class Task(ABC):
         return tuple(type(self.weights).model_fields)
 
     def numbers(self) -> np.ndarray:
-        """What the kernels read beside the readings: here those of the limits."""
+        """Numbers that the kernels read beside the readings: here those of the limits, shape (n,)."""
         return self.limits.numbers()  # type: ignore[attr-defined]
 
     def weight_numbers(self) -> np.ndarray:
-        """Weight of each term."""
+        """Weight of each reward term, in their order, shape (n,)."""
         return np.array([getattr(self.weights, name) for name in self.terms], dtype=float)
 
     def summary(self, structure: Sequence[Slice]) -> str:
         """A table of what is active: reward terms, observed channels, actions, and what ends an episode.
 
         Args:
-            structure: of the observation.
+            structure: parts of the observation, see `AssistanceEnv.observation_structure`.
         """
         lines = [f"{type(self).__name__}", "", f"{'reward term':28}{'weight':>10}"]
         lines += [f"{name:28}{getattr(self.weights, name):10.4g}" for name in self.terms]
@@ -125,13 +133,13 @@ class Task(ABC):
         return "\n".join(lines)
 
     def event(self, code: int, values: Values) -> str:
-        """What is said of an event by its code."""
+        """The sentence on an event, by the event's code."""
         return self.sentence(self.events[code - FIRST_EVENT], values)
 
 
 @compiled
 def readings(w):
-    """All readings of a world."""
+    """All readings of a world, one component behind the other."""
     return floats(inner(w, WORLD.task), TASK.readings)
 
 
@@ -149,19 +157,19 @@ def terms_of(w):
 
 @compiled
 def task_numbers(w):
-    """What `Task.numbers` gave."""
+    """The numbers of `Task.numbers`."""
     return floats(inner(w, WORLD.task), TASK.numbers)
 
 
 @compiled
 def step_of(w):
-    """Control periods done."""
+    """Number of control periods that are done."""
     return ints(w, WORLD.status)[STATUS.step]
 
 
 @compiled
 def event_of(w):
-    """Code of the event so far."""
+    """Code of the event that ends the episode, NOTHING where there is none."""
     return ints(w, WORLD.status)[STATUS.event]
 
 

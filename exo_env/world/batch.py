@@ -22,12 +22,12 @@ BESIDE = (
     "noise", "tremor", "wanted", "course", "preview", "lacking", "newton", "newton_lu", "rates", "rate_lu", "draw",
     "scaling", "subject", "rest", "cleared",
 )  # fmt: skip
-"""Fields not fetched ahead: of what goes over an episode a period reads one row, and what a reset reads it does not."""
+"""Fields that are not fetched ahead: a period reads one row of what spans an episode, and nothing of a reset's."""
 
 
 @compiled
-def collect(w, told, observation, numbers, status):
-    """What the agent is told of a world: observation; reward, terms and the readings at places `told`; status."""
+def collect(w, reported, observation, numbers, status):
+    """Copy what a step gives: observation; reward, terms and the readings at the places `reported`; status."""
     seen, task, now = (
         floats(inner(w, WORLD.observer), OBSERVER.observation),
         inner(w, WORLD.task),
@@ -39,14 +39,14 @@ def collect(w, told, observation, numbers, status):
     numbers[0] = floats(task, TASK.reward)[0]
     for i in range(terms.shape[0]):
         numbers[1 + i] = terms[i]
-    for i in range(told.shape[0]):
-        numbers[1 + terms.shape[0] + i] = r[told[i]]
+    for i in range(reported.shape[0]):
+        numbers[1 + terms.shape[0] + i] = r[reported[i]]
     for i in range(status.shape[0]):
         status[i] = now[i]
 
 
 @compiled(nogil=True)
-def run_some(addresses, areas, which, actions, told, observations, numbers, status, ahead, done):
+def run_some(addresses, areas, which, actions, reported, observations, numbers, status, ahead, done):
     """A control period of worlds which[k] that no other thread has taken, until all are done.
 
     `done` counts those that are taken; the world `ahead` of them is fetched. Where the solver gives up, `status` holds
@@ -59,22 +59,22 @@ def run_some(addresses, areas, which, actions, told, observations, numbers, stat
         i = which[k]
         w = table_at(addresses[i], FIELDS)
         if run_period(w, actions[i]) == DONE:
-            collect(w, told, observations[i], numbers[i], status[i])
+            collect(w, reported, observations[i], numbers[i], status[i])
         else:
             status[i, STATUS.code] = ints(w, WORLD.status)[STATUS.code]
         k = claim(done)
 
 
 @compiled(nogil=True)
-def begin_some(addresses, which, told, observations, numbers, status, codes, done):
-    """Begin episodes in the worlds which[k] that no other thread has taken; `codes` holds what came of each."""
+def begin_some(addresses, which, reported, observations, numbers, status, codes, done):
+    """Begin episodes in the worlds which[k] that no other thread has taken; `codes` takes the code of each."""
     k = claim(done)
     while k < which.shape[0]:
         i = which[k]
         w = table_at(addresses[i], FIELDS)
         codes[k] = begin_episode(w)
         if codes[k] == BEGUN:
-            collect(w, told, observations[i], numbers[i], status[i])
+            collect(w, reported, observations[i], numbers[i], status[i])
         k = claim(done)
 
 
@@ -85,43 +85,49 @@ class Batch:
         size: number of worlds.
         observed: components of an observation.
         terms: number of reward terms.
-        told: places of the readings that are collected.
-        threads: that step them; None takes one for each core.
+        reported: places of the readings that are collected.
+        threads: number of threads that step them; None takes one for each core.
 
     Attributes:
         observations: float32, shape (size, observed).
-        numbers: reward, terms and readings, shape (size, 1 + terms + len(told)).
-        status: at the places of tables.STATUS, shape (size, 3).
+        numbers: reward, terms and readings, shape (size, 1 + terms + len(reported)).
+        status: numbers at the places of tables.STATUS, shape (size, 3).
     """
 
-    def __init__(self, size: int, observed: int, terms: int, told: np.ndarray, threads: int | None = None) -> None:
+    def __init__(self, size: int, observed: int, terms: int, reported: np.ndarray, threads: int | None = None) -> None:
         self.threads = min(size, threads or _cores())
-        self._addresses, self._told = np.zeros(size, np.int64), told
+        self._addresses, self._reported = np.zeros(size, np.int64), reported
         self._areas = np.zeros((size, AREAS, 2), np.int64)
         # Compiled code knows addresses only: what they point to is kept here.
         self.worlds: list[Packed | None] = [None] * size
         self.observations = np.zeros((size, observed), np.float32)
-        self.numbers = np.zeros((size, 1 + terms + len(told)))
+        self.numbers = np.zeros((size, 1 + terms + len(reported)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
         # The thread that calls works, too.
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
     def put(self, i: int, world: Packed) -> None:
-        """World i is that of packed WorldTables."""
+        """Make the packed WorldTables world i."""
         if self.worlds[i] is not world:
             self.worlds[i], self._areas[i] = world, areas_of(world, BESIDE)
             self._addresses[i] = world.table.ctypes.data
 
     def take(self, i: int) -> None:
-        """Collect what world i tells, where something else than the batch has moved it."""
-        collect(table_at(self._addresses[i], FIELDS), self._told, self.observations[i], self.numbers[i], self.status[i])
+        """Copy what world i gives, where something else than the batch has moved it."""
+        collect(
+            table_at(self._addresses[i], FIELDS), self._reported, self.observations[i], self.numbers[i], self.status[i]
+        )
 
     def begin(self, which: np.ndarray) -> np.ndarray:
-        """Begin episodes in the worlds `which`, shape (k,), as drawn for them; gives what came of each."""
+        """Begin the episodes that are drawn for the worlds `which`, shape (k,).
+
+        Returns:
+            The code of each, see reset.py, shape (k,).
+        """
         codes = np.zeros(len(which), np.int64)
         self._share(
-            len(which), begin_some, self._addresses, which, self._told, self.observations, self.numbers, self.status,
-            codes,
+            len(which), begin_some, self._addresses, which, self._reported, self.observations, self.numbers,
+            self.status, codes,
         )  # fmt: skip
         return codes
 
@@ -129,10 +135,10 @@ class Batch:
         """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, n).
 
         Returns:
-            Those whose solver gave up.
+            Numbers of the worlds whose solver gave up.
         """
         self._share(
-            len(which), run_some, self._addresses, self._areas, which, actions, self._told, self.observations,
+            len(which), run_some, self._addresses, self._areas, which, actions, self._reported, self.observations,
             self.numbers, self.status, min(self.threads, len(which)),
         )  # fmt: skip
         return which[self.status[which, STATUS.code] != DONE]
@@ -170,5 +176,5 @@ def _wait(jobs: list[Future]) -> None:
 
 
 def _cores() -> int:
-    """That this process may use, where the system says so."""
+    """Number of cores that this process may use, where the system says so, or else of all."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

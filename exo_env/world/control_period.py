@@ -43,7 +43,7 @@ from exo_env.world.tables import (
 
 @compiled
 def effort_of(w):
-    """The patient's EffortState."""
+    """The `EffortState` of the patient."""
     e = inner(inner(w, WORLD.patient), PATIENT_TABLES.effort)
     return EffortState(
         floats(e, EFFORT.sign), floats(e, EFFORT.present), floats(e, EFFORT.active), floats(e, EFFORT.fatigued),
@@ -53,7 +53,7 @@ def effort_of(w):
 
 @compiled
 def ramp(state, row, value, period):
-    """The input in a row of the signals goes from what it is to `value` over the coming period."""
+    """Let the input in a row of the signals go from what it is to `value` over the coming period."""
     signals = inner(state, STATE.signals)
     c, starts, t = matrix(signals, SIGNALS.c), floats(signals, SIGNALS.t), floats(state, STATE.clock)[T]
     now = c[row, 0] + c[row, 1] * (t - starts[row])
@@ -63,7 +63,7 @@ def ramp(state, row, value, period):
 
 @compiled
 def set_commands(w):
-    """Commands of the coming period, from the action.
+    """Set the commands of the coming period, from the action.
 
     Only slopes of inputs jump, which nothing here reads: accelerations go on, and so does the method, which has no
     past.
@@ -80,7 +80,7 @@ def set_commands(w):
 
 @compiled
 def set_excitations(w):
-    """Excitations of the coming period, from what the patient wants and feels."""
+    """Set the excitations of the coming period, from what the patient wants and feels."""
     patient, plan = inner(w, WORLD.patient), inner(w, WORLD.plan)
     state, period = inner(inner(w, WORLD.dynamics), DYNAMICS.state), floats(w, WORLD.period)[0]
     felt, k = floats(patient, PATIENT_TABLES.felt), ints(w, WORLD.status)[STATUS.step]
@@ -115,7 +115,7 @@ def move(w):
 
 @compiled
 def read(w):
-    """Sensors of the world, what the patient feels, and the readings of the task, at the control time `status.step`."""
+    """Read the sensors, what the patient feels and the readings of the task, at the control time `status.step`."""
     dynamics, task, patient = inner(w, WORLD.dynamics), inner(w, WORLD.task), inner(w, WORLD.patient)
     s, y = inner(dynamics, DYNAMICS.state), floats(dynamics, DYNAMICS.y)
     read_sensors(
@@ -133,10 +133,10 @@ def read(w):
 
 @compiled
 def observe(w, first):
-    """The observation of the present readings; `first`: as if they had been true for long."""
+    """Fill the observation of the present readings; with `first`, they are taken to have been true for long."""
     o = inner(w, WORLD.observer)
     imperfect(
-        floats(inner(w, WORLD.task), TASK.readings), ints(o, OBSERVER.columns), matrix(o, OBSERVER.sensors),
+        floats(inner(w, WORLD.task), TASK.readings), ints(o, OBSERVER.columns), matrix(o, OBSERVER.imperfections),
         matrix(o, OBSERVER.memory), matrix(o, OBSERVER.noise)[ints(w, WORLD.status)[STATUS.step]], first,
         floats(o, OBSERVER.observation),
     )  # fmt: skip
@@ -144,7 +144,7 @@ def observe(w, first):
 
 @compiled
 def judge(w):
-    """Event and reward of the period that ends now."""
+    """Set event and reward of the period that ends now."""
     task, status = inner(w, WORLD.task), ints(w, WORLD.status)
     if status[STATUS.code] != DONE:
         status[STATUS.event] = SOLVER
@@ -157,7 +157,7 @@ def judge(w):
 
 @compiled
 def finish(w):
-    """What follows the solver: where it failed, readings and observation stay those of before."""
+    """Do what follows the solver; where it failed, readings and observation stay those of before."""
     status = ints(w, WORLD.status)
     status[STATUS.step] += 1
     if status[STATUS.code] == DONE:
@@ -168,7 +168,7 @@ def finish(w):
 
 @compiled
 def run_period(w, action):
-    """One control period with an action; gives the solver's code. Where it is not DONE, call `finish`."""
+    """Do one control period with an action; gives the solver's code. Where it is not DONE, call `finish`."""
     drive = inner(w, WORLD.drive)
     now, before = floats(drive, DRIVE.action), floats(drive, DRIVE.before)
     for i in range(now.shape[0]):
@@ -184,6 +184,6 @@ def run_period(w, action):
 
 @compiled
 def begin(w):
-    """Readings and observation of the start."""
+    """Fill readings and observation of the start."""
     read(w)
     observe(w, True)

@@ -1,4 +1,4 @@
-"""Values of psi along an episode: polynomials in pieces, evaluated at times."""
+"""The course of a movement: psi, its rate and its acceleration at times, from polynomials in pieces."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from exo_env.jit import compiled
 
 @compiled
 def course_of(starts, c, times, out):
-    """Value, rate and acceleration of a signal's pieces, which go on behind the last and before the first.
+    """Fill value, rate and acceleration of a signal, whose pieces go on behind the last and before the first.
 
     Args:
-        starts: of the pieces [s], shape (n,).
+        starts: starts of the pieces [s], shape (n,).
         c: their coefficients, shape (n, 6).
-        times: in rising order [s], shape (k,).
-        out: shape (k, 3).
+        times: times in rising order [s], shape (k,).
+        out: the course, filled, shape (k, 3).
     """
     i = 0
     for k in range(times.shape[0]):

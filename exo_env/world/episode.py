@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,37 +14,18 @@ from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.patient.ability import Need
 from exo_env.patient.effort import PRESENT
 from exo_env.patient.patient import Patient
+from exo_env.world.draw import Draw
 from exo_env.world.tables import WorldTables
-
-if TYPE_CHECKING:
-    from exo_env.world.world import PatientWorld
-
-
-@dataclass(frozen=True, eq=False)
-class Draw:
-    """What is drawn for an episode."""
-
-    key: int
-    """Of the random streams (streams.py), which the noise of the episode comes from."""
-    patient: np.ndarray
-    """Row of the patient, in the order of FIELDS."""
-    load: float
-    """Weight on the machine [kg]."""
-    movement: np.ndarray
-    """Numbers of the movement, with those that the episode fixes."""
-    start: float
-    """Elbow angle at the start [rad]."""
-    phase: float
-    """Of the tremor [rad]."""
+from exo_env.world.world import PatientWorld
 
 
 class Episode:
     """A patient in the device. World, model and effort are those of the present: another's after the next reset.
 
     Args:
-        world: in which it takes place.
-        draw: who and what was drawn.
-        need: of the patient on this movement.
+        world: world in which it takes place.
+        draw: what is drawn for it.
+        need: what the patient lacks on this movement.
     """
 
     def __init__(self, world: PatientWorld, draw: Draw, need: Need) -> None:
@@ -56,7 +35,7 @@ class Episode:
 
     @cached_property
     def patient(self) -> Patient:
-        """Who."""
+        """The patient in the device."""
         return Patient.of_row(self.draw.patient)
 
     @property
@@ -71,7 +50,7 @@ class Episode:
 
     @property
     def drive(self) -> Drive:
-        """From actions to commands."""
+        """The drive, which makes commands of actions."""
         return self._world.drive
 
     @property
@@ -81,12 +60,12 @@ class Episode:
 
     @property
     def world(self) -> World:
-        """What moves."""
+        """The simulation of dms_core that moves."""
         return self._world.dynamics
 
     @property
     def tables(self) -> WorldTables:
-        """The arrays of the present."""
+        """All arrays of the world, as they are now."""
         return self._world.tables
 
     @property
@@ -101,7 +80,7 @@ class Episode:
 
     @property
     def effort(self) -> float:
-        """What the patient intends, as a multiple of what was planned: s [-]."""
+        """Effort s of the patient, as a multiple of the planned command [-]."""
         return float(self.tables.patient.effort.present[PRESENT.effort])
 
     @cached_property
@@ -111,7 +90,7 @@ class Episode:
 
     @cached_property
     def arm(self) -> Arm:
-        """Of the patient."""
+        """The patient's arm."""
         return self.ecosystem.arm()
 
     @cached_property

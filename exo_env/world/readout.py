@@ -1,4 +1,4 @@
-"""True readings of an episode by name, and what `info` tells."""
+"""True readings of an episode by name, and the contents of `info`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from exo_env.world.world import PatientWorld
 
 
 class Readout:
-    """What the world says at the present control time.
+    """The readings of a world at the present control time.
 
     Args:
-        world: that is read.
-        episode: that takes place in it.
+        world: world that is read.
+        episode: episode that takes place in it.
     """
 
     def __init__(self, world: PatientWorld, episode: Episode) -> None:
@@ -35,7 +35,7 @@ class Readout:
         return self.world.tables.task.readings[first : first + count].copy()
 
     def number(self, name: str) -> float:
-        """A reading of one component."""
+        """A reading of one component, by its name."""
         return float(self(name)[0])
 
     def sensor(self, name: str) -> float:
@@ -76,7 +76,11 @@ class Readout:
         return self.world.task.event(code, self)
 
     def start_info(self, movement: Movement) -> dict[str, Any]:
-        """What the episode is made of; `movement` names the numbers of the movement."""
+        """The `info` of a reset: patient, load, ability, movement and angle of the start.
+
+        Args:
+            movement: names the numbers of the movement.
+        """
         draw = self.episode.draw
         return {
             "patient": fields_of(draw.patient.tolist()),
@@ -88,23 +92,23 @@ class Readout:
         }
 
     def info(self, weights: dict[str, float], happened: str | None) -> dict[str, Any]:
-        """What a step tells.
+        """The `info` of a step.
 
         Args:
-            weights: of the reward.
-            happened: what ended the episode.
+            weights: weight of each reward term.
+            happened: sentence on what ended the episode, None where nothing has.
         """
         task, tables = self.world.task, self.world.tables
-        found: dict[str, Any] = {
+        info: dict[str, Any] = {
             "reward_terms": dict(zip(task.terms, tables.task.terms.tolist(), strict=True)),
             "reward_weights": weights.copy(),
             "time": float(self.world.times[tables.status[STATUS.step]]),
-            **{told.name: told.factor * self.number(told.reading) for told in task.told},
+            **{x.name: x.factor * self.number(x.reading) for x in task.reported},
             "solver_failed": bool(tables.status[STATUS.event] == SOLVER),
         }
         if happened is not None:
-            found["event"] = happened
-        return found
+            info["event"] = happened
+        return info
 
 
 OTHER_NAMES = {"error": "tracking_error", "reaction": "elbow_reaction"}

@@ -1,10 +1,10 @@
-"""Compiled begin of an episode: from a patient, a load and a movement to a world at rest and its first observation.
+"""Compiled part of a reset: from a patient, a load and a movement to a world at rest and its first observation.
 
     key -> noise (streams.py)      sizes -> numbers of the world (scaling.py)      movement -> psi, preview
     arm, expected load -> command (patient/motor_command.py)      patient, load -> need (patient/ability.py)
     command -> activations, holding tension -> start (rest_pose.py) -> rates, readings
 
-Who comes and what is lifted stands in `WorldTables.draw` before. Worlds are reset side by side without the Python lock,
+Patient, load and movement stand in `WorldTables.draw` before. Worlds are reset side by side without the Python lock,
 as they are stepped.
 """
 
@@ -36,9 +36,9 @@ from exo_env.patient.ability import put_lacking
 from exo_env.patient.effort import reset_effort, start_excitation
 from exo_env.patient.motor_command import SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
-from exo_env.patient.static_optimisation import ArmTable, LoadTable, drawn, muscle_moment, needed_moment, planned
+from exo_env.patient.static_optimisation import ArmTable, LoadTable, interpolated, muscle_moment, needed_moment, planned
 from exo_env.streams import fill_normals
-from exo_env.tasks.noise import SENSOR
+from exo_env.tasks.noise import IMPERFECTION
 from exo_env.world.control_period import begin, effort_of, options_of
 from exo_env.world.course import course_of
 from exo_env.world.rest_pose import put_rest
@@ -69,13 +69,13 @@ FIRST_STEP = 0.5
 CLOSED = 1e-10
 """Largest |phi| of a start [m or -], as in dms_core's assembly."""
 BEGUN, PULLEY_IN_REACH, UNSETTLED, NO_RATES, GAPING = range(5)
-"""What came of a reset: all went well; the rope's end could come to a pulley; the command did not settle; there are no
-accelerations; joints stay open."""
+"""Codes of what came of a reset: all went well; an end of the rope could come to a pulley; the command did not settle;
+there are no accelerations; joints stay open."""
 
 
 @compiled
 def arm_of(w):
-    """The patient's ArmTable."""
+    """The `ArmTable` of the patient."""
     s, x = inner(w, WORLD.subject), inner(w, WORLD.scaling)
     return ArmTable(
         matrix(x, SCALING.muscles), floats(s, SUBJECT.sign), ints(s, SUBJECT.first), flags(s, SUBJECT.moving),
@@ -85,7 +85,7 @@ def arm_of(w):
 
 @compiled
 def load_of(w, weight):
-    """The patient's LoadTable with a weight [kg]."""
+    """The `LoadTable` of the patient with a weight [kg]."""
     s, x = inner(w, WORLD.subject), floats(inner(w, WORLD.scaling), SCALING.forearm)
     return LoadTable(
         x[0], x[1], x[2:5], x[5:8], floats(s, SUBJECT.handle)[0], weight, floats(s, SUBJECT.low_pulley),
@@ -104,13 +104,17 @@ def pulleys_out_of_reach(w, arm, load):
 
 @compiled
 def draw_noise(w):
-    """Phase of the tremor is drawn elsewhere; here its wandering and the noise of every component that has any."""
+    """Draw the wandering of the tremor's phase, and the noise of every component that has any."""
     o, key = inner(w, WORLD.observer), np.uint64(ints(inner(w, WORLD.draw), DRAW.key)[0])
-    sensors, noise, names = matrix(o, OBSERVER.sensors), matrix(o, OBSERVER.noise), ints(o, OBSERVER.streams)
+    imperfections, noise, names = (
+        matrix(o, OBSERVER.imperfections),
+        matrix(o, OBSERVER.noise),
+        ints(o, OBSERVER.streams),
+    )
     fill_normals(key, np.uint64(names[0]), floats(o, OBSERVER.tremor))
     column = np.empty(noise.shape[0])
-    for i in range(sensors.shape[0]):
-        if sensors[i, SENSOR.deviation] > 0.0:
+    for i in range(imperfections.shape[0]):
+        if imperfections[i, IMPERFECTION.deviation] > 0.0:
             fill_normals(key, np.uint64(names[1 + i]), column)
             for k in range(column.shape[0]):
                 noise[k, i] = column[k]
@@ -118,7 +122,7 @@ def draw_noise(w):
 
 @compiled
 def put_course(w):
-    """The movement into the signal of psi, into its course and its preview."""
+    """Put the movement into the signal of psi, its course and its preview."""
     plan, period = inner(w, WORLD.plan), floats(w, WORLD.period)[0]
     movement, drawn_movement = floats(plan, PLAN.movement), floats(inner(w, WORLD.draw), DRAW.movement)
     for i in range(movement.shape[0]):
@@ -141,9 +145,9 @@ def put_course(w):
 
 @compiled
 def put_command(w, arm, load):
-    """What the patient wants at each control time; gives the estimated error in an activation.
+    """Fill the motor command at each control time; gives the estimated error in an activation.
 
-    What rests for long is planned once.
+    A long rest is planned once.
     """
     plan, times, moves = inner(w, WORLD.plan), floats(inner(w, WORLD.subject), SUBJECT.times), False
     n = times.shape[0]
@@ -163,13 +167,13 @@ def put_command(w, arm, load):
     moment, activations = np.empty(count), np.empty((count, arm.sign.shape[0]))
     _, left = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION, SETTLED, moment, activations)
     wanted = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted)
-    drawn(activations, row, times[1], floats(w, WORLD.period)[0], wanted)
+    interpolated(activations, row, times[1], floats(w, WORLD.period)[0], wanted)
     return left
 
 
 @compiled
 def put_patient(w, arm, load, activations):
-    """Traits, need and effort of the patient; fills the activations of the start, shape (m,)."""
+    """Put traits, need and effort of the patient in their places; fills the activations of the start, shape (m,)."""
     draw, patient, plan = inner(w, WORLD.draw), inner(w, WORLD.patient), inner(w, WORLD.plan)
     row, traits = floats(draw, DRAW.patient), floats(patient, PATIENT_TABLES.traits)
     for k in range(traits.shape[0]):
@@ -189,7 +193,7 @@ def put_patient(w, arm, load, activations):
 
 @compiled
 def put_inputs(w, arm, load, activations):
-    """Inputs at rest until the first control period: activations, and commands that hold the arm where they can."""
+    """Hold the inputs until the first control period: activations, and commands that hold the arm where they can."""
     subject, drive, g = inner(w, WORLD.subject), inner(w, WORLD.drive), vec(load.gravity, 0)
     angle, ends = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start], matrix(subject, SUBJECT.rope)
     needed = needed_moment(arm, load, angle, 0.0, 0.0)
@@ -207,7 +211,7 @@ def put_inputs(w, arm, load, activations):
 
 @compiled
 def hold(signals, row, value):
-    """The input in a row of the signals keeps a value."""
+    """Let the input in a row of the signals keep a value."""
     c = matrix(signals, SIGNALS.c)
     floats(signals, SIGNALS.t)[row], c[row] = 0.0, 0.0
     c[row, 0] = value
@@ -215,7 +219,7 @@ def hold(signals, row, value):
 
 @compiled
 def put_world(w, arm, load, activations):
-    """The world at rest at its start, without accelerations."""
+    """Put the world at rest at its start, without accelerations."""
     scaling, rest, drive = inner(w, WORLD.scaling), inner(w, WORLD.rest), inner(w, WORLD.drive)
     q, v, psi = floats(scaling, SCALING.start), floats(rest, REST.v), matrix(inner(w, WORLD.plan), PLAN.course)[0, 0]
     angle = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start]
@@ -229,7 +233,7 @@ def put_world(w, arm, load, activations):
 
 @compiled
 def settle(w):
-    """Accelerations and multipliers of a world at its start, and the first observation; gives what came of it."""
+    """Solve for accelerations and multipliers of a world at its start, and observe it; gives what came of it."""
     dynamics = inner(w, WORLD.dynamics)
     m, s = inner(dynamics, DYNAMICS.model), inner(dynamics, DYNAMICS.state)
     if not restart(m, s, options_of(w)):

@@ -41,7 +41,7 @@ def product(p, r):
 
 @compiled
 def _put_body(q, at, origin, p, centre):
-    """A body whose frame is at `origin` with Euler parameters p; its coordinates are those of its centre of mass."""
+    """Put a body with its frame at `origin` and Euler parameters p; its coordinates are those of its centre of mass."""
     for i in range(4):
         q[at + 3 + i] = p[i]
     c = rotated(q, at, centre)
@@ -79,11 +79,11 @@ def put_rest(w, arm, load, angle, reference, activations, q, v):
         w: the world.
         arm: an ArmTable.
         load: a LoadTable with the real weight.
-        angle: of the elbow [rad].
+        angle: angle of the elbow [rad].
         reference: psi at the start [rad].
-        activations: of the muscles, shape (m,).
-        q: coordinates, of which the constant ones stay.
-        v: their rates, 0 but for the controller's.
+        activations: activations of the muscles [-], shape (m,).
+        q: coordinates, filled, of which the constant ones stay.
+        v: their rates, which are 0 but for the controller's.
     """
     subject, rest = inner(w, WORLD.subject), inner(w, WORLD.rest)
     at, fibres = ints(rest, REST.places), ints(rest, REST.fibres)

@@ -7,7 +7,7 @@ linear in few monomials,
     x = C phi,   phi = (1, H, H^2, M, M H^2, load, strength M / H, tau_act, tau_deact, 1 / min(tau_act, tau_deact),
                         traits of joints)
 
-with constants C for an ecosystem, a drive and a sex, found by declaring as many persons as there are monomials; one
+with constants C for an ecosystem, a drive and a sex, known by declaring as many persons as there are monomials; one
 more person is declared to see that it is so. Only the length of the gym rope and the start of what moves are not
 linear; rest_pose.py gives them.
 """
@@ -59,13 +59,13 @@ class Numbers(NamedTuple):
     """Numbers of a world, as far as they depend on who is in it and what is lifted."""
 
     model: tuple[np.ndarray, ...]
-    """As `Model.numbers`."""
+    """Arrays of `Model.numbers`."""
     start: np.ndarray
     """Coordinates at the start; true only for what does not move, shape (n_q,)."""
     muscles: np.ndarray
     points: np.ndarray
     elbow: np.ndarray
-    """As in static_optimisation.ArmTable."""
+    """Muscles, points and elbow, as in static_optimisation.ArmTable."""
     forearm: np.ndarray
     """Inertia about the elbow, mass, centre of mass and grip, as in static_optimisation.LoadTable, shape (8,)."""
 
@@ -84,11 +84,11 @@ def declared(
 
     Args:
         ecosystem: person, device, machine and weight.
-        drive: of the action mode.
+        drive: drive of the action mode.
         start: elbow angle [rad].
-        held: commands of the drive at the start, shape (2,).
-        reference: course of psi [rad]; default: it stays at the start.
-        activations: of the muscles at the start [-], shape (6,); default: the least.
+        held: commands of the drive at the start, shape (n_c,).
+        reference: psi over time [rad]; default: it stays at the start.
+        activations: activations of the muscles at the start [-], shape (m,); default: the least.
         times: the muscles' time constants [s]; default: those of arm26.
     """
     given = {} if activations is None else dict(zip(ecosystem.arm().muscles, map(float, activations), strict=True))
@@ -132,13 +132,13 @@ def put_monomials(body_mass, height, strength, load, rise, fall, phi):
     """Fill the first places of phi with sizes as multiples of arm26's.
 
     Args:
-        body_mass: [kg].
-        height: [m].
+        body_mass: body mass [kg].
+        height: height [m].
         strength: factor on every muscle's F0 [-].
-        load: on the machine [kg].
+        load: weight on the machine [kg].
         rise: activation time constant [s].
         fall: deactivation time constant [s].
-        phi: shape (len(MONOMIALS),); the traits of joints are not touched.
+        phi: filled, shape (len(MONOMIALS),); the traits of joints are not touched.
     """
     m, h = body_mass / MASS_0, height / HEIGHT_0
     phi[MONOMIALS.one], phi[MONOMIALS.height], phi[MONOMIALS.area] = 1.0, h, h * h
@@ -149,7 +149,7 @@ def put_monomials(body_mass, height, strength, load, rise, fall, phi):
 
 @compiled
 def put_numbers(w):
-    """Sizes of a patient, and the load, into the numbers of a world."""
+    """Put the numbers that follow from a patient's sizes and the load into a world."""
     scaling, draw = inner(w, WORLD.scaling), inner(w, WORLD.draw)
     who, times, phi = floats(draw, DRAW.patient), floats(scaling, SCALING.constants), np.empty(len(MONOMIALS))
     put_monomials(
@@ -177,7 +177,13 @@ def put_numbers(w):
 
 
 def monomials(person: Person, load: float, times: dict[str, float]) -> np.ndarray:
-    """phi of a person who lifts a load [kg]; times: activation and deactivation time constants of ThelenMuscle [s]."""
+    """Monomials phi of a person.
+
+    Args:
+        person: the person.
+        load: weight on the machine [kg].
+        times: activation and deactivation time constants, as fields of ThelenMuscle [s].
+    """
     phi = np.empty(len(MONOMIALS))
     put_monomials(person.body_mass, person.height, person.strength, load, *times.values(), phi)
     phi[SIZES:] = [getattr(person, name) for name in JOINT_TRAITS]
@@ -196,7 +202,7 @@ class Scaling:
 
     Args:
         ecosystem: device, machine and anatomy; person and weight do not matter.
-        drive: of the action mode.
+        drive: drive of the action mode.
     """
 
     def __init__(self, ecosystem: Ecosystem, drive: Drive) -> None:
@@ -204,19 +210,19 @@ class Scaling:
         self._known, self._lock = set[str](), Lock()
         self._parts: list[tuple[int, int, tuple[int, ...]]] = []
         self.both = np.zeros((0, len(MONOMIALS)))
-        """C of men, then of women, as far as they were asked for, shape (2 n, monomials)."""
+        """Constants C for men, then for women, as far as they were asked for, shape (2 n, monomials)."""
 
     def split(self, x: np.ndarray) -> Numbers:
-        """C phi, shape (n,), as views of its parts."""
+        """Numbers C phi, shape (n,), as views of their parts."""
         parts = [x[first:end].reshape(shape) for first, end, shape in self._parts]
         count = len(parts) - len(Numbers._fields) + 1
         return Numbers(tuple(parts[:count]), *parts[count:])
 
     def coefficients(self, sex: Sex) -> np.ndarray:
-        """C, shape (n, monomials)."""
+        """Constants C of a sex, shape (n, monomials)."""
         with self._lock:
             if sex not in self._known:
-                C = self._found(sex)
+                C = self._fitted(sex)
                 if not self._known:
                     self.both = np.zeros((len(SEXES) * len(C), len(MONOMIALS)))
                 self.both[SEXES.index(sex) * len(C) :][: len(C)] = C
@@ -224,8 +230,8 @@ class Scaling:
         n = len(self.both) // len(SEXES)
         return self.both[SEXES.index(sex) * n :][:n]
 
-    def _found(self, sex: Sex) -> np.ndarray:
-        """C, shape (numbers, monomials), from as many persons as there are monomials, and checked by one more."""
+    def _fitted(self, sex: Sex) -> np.ndarray:
+        """Constants C, shape (n, monomials), from as many persons as there are monomials, and checked by one more."""
         sizes, joints = np.random.default_rng(0), np.random.default_rng(1)
         rows, found = [], []
         for _ in range(len(MONOMIALS) + 1):
@@ -240,7 +246,7 @@ class Scaling:
     def _declared(
         self, sex: Sex, sizes: np.random.Generator, joints: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
-        """phi and all numbers of a random person."""
+        """Monomials phi and all numbers of a random person."""
         m, h, strength, load, rise, fall = sizes.uniform((0.5, 0.8, 0.5, 0.5, 0.8, 3.0), (2.0, 1.2, 2.0, 2.0, 8.0, 5.0))
         traits = {name: joints.uniform(*range_of(Person, name)) for name in JOINT_TRAITS}
         person = Person(body_mass=m * MASS_0, height=h * HEIGHT_0, sex=sex, strength=strength, **traits)
@@ -255,7 +261,7 @@ class Scaling:
         return monomials(person, load, times), np.concatenate([x.ravel() for x in parts])
 
     def _check(self, fitted: np.ndarray, numbers: np.ndarray, largest: np.ndarray) -> None:
-        """Refuses numbers of elements that are not linear in phi; rope and start are given by rest_pose.py.
+        """Refuse numbers of elements that are not linear in phi; rope and start are given by rest_pose.py.
 
         Raises:
             ModelError: names the element.

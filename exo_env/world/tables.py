@@ -31,8 +31,11 @@ class DynamicsTables(NamedTuple):
     """The differential-algebraic system and its sensors."""
 
     model: Packed
+    """Tables of the equations (dms_core)."""
     state: Packed
+    """Arrays of the simulation (dms_core)."""
     sensing: Packed
+    """Tables of the sensors (dms_core)."""
     options: Kept
     """Options of the solver, in the order of `Options`."""
     y: Cleared
@@ -45,7 +48,7 @@ class DriveTables(NamedTuple):
     kernel: Kept
     """Address of the drive's kernel, shape (1,)."""
     numbers: Kept
-    """What the kernel reads beside the action."""
+    """Numbers of the drive that the kernel reads beside the action."""
     steps: Kept
     """Largest change of each command in a control period, shape (n_c,)."""
     start: Kept
@@ -57,33 +60,36 @@ class DriveTables(NamedTuple):
     axes: Kept
     """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
     action: Cleared
+    """The present action, shape (n_a,)."""
     before: Cleared
     """The action of the period before, shape (n_a,)."""
     wanted: Cleared
-    """What the kernel wants each command to be at the end of the period, shape (n_c,)."""
+    """What each command is to be at the end of the period, from the kernel, shape (n_c,)."""
     commands: Cleared
-    """Reached at the end of the last period, shape (n_c,)."""
+    """Commands that were reached at the end of the last period, shape (n_c,)."""
 
 
 class PatientTables(NamedTuple):
-    """Who is in the device; m muscles, k control times."""
+    """The patient in the device; m muscles, k control times."""
 
     traits: Cleared
     """Numbers of the patient, at the places of PATIENT."""
     effort: EffortState
+    """Effort, fatigue and the memories of delayed signals."""
     wanted: Cleared
     """Motor command at each control time, shape (k, m)."""
     excitations: Cleared
+    """Excitation of each muscle at the end of the last period [-], shape (m,)."""
     felt: Cleared
     """What the patient feels of the elbow, at the places of FELT."""
     senses: Kept
-    """Their places in y."""
+    """Places in y of the sensors that give it."""
     rows: Kept
     """Row of each excitation in the signals of the world, shape (m,)."""
 
 
 class PlanTables(NamedTuple):
-    """What the patient intends to do, and what that needs."""
+    """The movement that the patient intends, and the moment that it needs; k control times."""
 
     kernel: Kept
     """Address of the movement's kernel, shape (1,)."""
@@ -92,7 +98,7 @@ class PlanTables(NamedTuple):
     starts: Kept
     """Starts of the pieces of psi in the signals of the world [s]."""
     coefficients: Kept
-    """Their coefficients, shape (n, 6)."""
+    """Coefficients of these pieces, shape (n, 6)."""
     course: Cleared
     """psi, its rate and its acceleration at each control time, shape (k, 3)."""
     horizons: Kept
@@ -106,7 +112,7 @@ class PlanTables(NamedTuple):
 
 
 class TaskTables(NamedTuple):
-    """What is read, rewarded and ended; see tasks/task.py."""
+    """Readings, reward terms and limits of the task; see tasks/task.py."""
 
     read: Kept
     """Address of the kernel `read`, shape (1,)."""
@@ -117,25 +123,27 @@ class TaskTables(NamedTuple):
     source: Kept
     """Places in y of the sensors that readings copy."""
     target: Kept
-    """Their places in the readings."""
+    """Place in the readings of each of these."""
     shown: Kept
     """Place in the readings, and in a patient's row, of each trait that a reading shows, shape (k, 2)."""
     numbers: Kept
-    """Limits, and what else the kernels read."""
+    """Numbers of the task that the kernels read: its limits, and what else it has."""
     weights: Kept
     """Weight of each reward term."""
     readings: Cleared
+    """Components of all readings, one behind the other."""
     terms: Cleared
+    """Value of each reward term, shape (n,)."""
     reward: Cleared
-    """Shape (1,)."""
+    """Sum of the terms times their weights, shape (1,)."""
 
 
 class ObserverTables(NamedTuple):
-    """What is observed, and how well; n components, k control times."""
+    """The observation and its imperfections; n components, k control times."""
 
     columns: Kept
     """Place of each component in the readings, shape (n,)."""
-    sensors: Kept
+    imperfections: Kept
     """Imperfections of each component, shape (n, 7); see tasks/noise.py."""
     streams: Kept
     """Random stream of each component's noise, as a signed number, shape (n,)."""
@@ -146,23 +154,24 @@ class ObserverTables(NamedTuple):
     memory: Cleared
     """Past readings, newest first, shape (depth, n)."""
     observation: Cleared
+    """The observation, in the scales of the channels, shape (n,)."""
 
 
 class DrawTables(NamedTuple):
-    """What was drawn for the episode that a reset begins."""
+    """The draw of the episode that a reset begins."""
 
     key: Kept
-    """Of the random streams, as a signed number, shape (1,)."""
+    """Key of the random streams (streams.py), as a signed number, shape (1,)."""
     patient: Kept
     """Row of the patient."""
     movement: Kept
     """Numbers of the movement."""
     given: Kept
-    """At the places of GIVEN."""
+    """Load, angle and phase of the start, at the places of GIVEN."""
 
 
 class ScalingTables(NamedTuple):
-    """How the numbers of a world follow from a patient's sizes; see scaling.py."""
+    """Numbers of the world that follow from a patient's sizes; see scaling.py."""
 
     coefficients: Kept
     """C for men, then for women, shape (2 n, monomials)."""
@@ -173,25 +182,30 @@ class ScalingTables(NamedTuple):
     targets: Kept
     """Where the model's numbers lie: a table as of arena.py, shape (k, 3)."""
     start: Kept
+    """Coordinates at the start; true only for what does not move, shape (n_q,)."""
     muscles: Kept
     points: Kept
     elbow: Kept
+    """Muscles, points of their paths, and centre of the elbow, as in an ArmTable."""
     forearm: Kept
+    """Inertia about the elbow, mass, centre of mass and grip, as in a LoadTable, shape (8,)."""
 
 
 class SubjectTables(NamedTuple):
-    """What of an arm and its load is the same for all patients; the rest is in ScalingTables."""
+    """Numbers of arm and load that are the same for all patients; the others are in ScalingTables."""
 
     sign: Kept
     first: Kept
     moving: Kept
     axis: Kept
-    """As in an ArmTable."""
+    """Muscles and their paths, as in an ArmTable."""
     gravity: Kept
+    """Gravity in ground axes [m/s^2], shape (3,)."""
     handle: Kept
     """Mass [kg], length [m], and distance of the centre of mass from the grip [m]."""
     low_pulley: Kept
     high_pulley: Kept
+    """Pulleys of the gym machine in ground axes [m], each of shape (3,)."""
     weight_height: Kept
     """Height of the weight at the start [m], shape (1,)."""
     link: Kept
@@ -199,18 +213,18 @@ class SubjectTables(NamedTuple):
     rope: Kept
     """Ends of the rope that lifts, on upper and lower link [m], shape (2, 3)."""
     times: Kept
-    """At which the command is planned [s]."""
+    """Times at which the command is planned [s]."""
 
 
 class RestTables(NamedTuple):
-    """Where the world is at rest; see rest_pose.py."""
+    """Numbers of the world at rest; see rest_pose.py."""
 
     orientation: Kept
     """Euler parameters of both links where the hinge is at 0, shape (4,)."""
     misaligned: Kept
     """1 where the hinge axis is not that of the elbow, or 0, shape (1,)."""
     shift: Kept
-    """From the elbow centre to the hinge, in ground axes [m]."""
+    """Vector from the elbow centre to the hinge, in ground axes [m], shape (3,)."""
     guided: Kept
     """Point that the guide leads, in the forearm's frame [m]."""
     link_centre: Kept
@@ -243,7 +257,9 @@ class WorldTables(NamedTuple):
     cleared: Kept
     """Address and number of 8-byte words of every array that a reset sets to zero, shape (n, 2)."""
     status: Cleared
+    """Progress of the episode, at the places of STATUS."""
     outcome: Cleared
+    """Results of the last reset, at the places of OUTCOME."""
 
 
 DYNAMICS, DRIVE, PATIENT_TABLES, PLAN, TASK, OBSERVER, DRAW, SCALING, SUBJECT, REST, WORLD, EFFORT = map(

@@ -26,7 +26,7 @@ AREAS, GAP = 96, 512
 
 @intrinsic
 def claim(typingctx, counter):  # noqa: ANN001, ANN201
-    """counter[0], int64, which goes up by one; no two threads are given the same number."""
+    """Give counter[0], int64, and raise it by one; no two threads are given the same number."""
     signature = types.int64(counter)
 
     def codegen(context, builder, sig, args):  # noqa: ANN001, ANN202

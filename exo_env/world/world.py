@@ -31,7 +31,7 @@ from exo_env.tasks.channels import first_places
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import Task
-from exo_env.world.episode import Draw, Episode
+from exo_env.world.draw import Draw
 from exo_env.world.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
 from exo_env.world.scaling import TEMPLATE_ANGLE, declared, scaling_of
 from exo_env.world.tables import (
@@ -62,15 +62,15 @@ class PatientWorld:
     """The world of one environment.
 
     Args:
-        ecosystem: device and machine; whose person and weight do not matter.
-        drive: from actions to commands.
-        task: what is read, rewarded and ended.
-        movement: what patients intend.
-        observer: what is observed, and how well.
+        ecosystem: anatomy, device and machine; its person and its weight do not matter.
+        drive: makes commands of actions.
+        task: says what is read, rewarded and ended.
+        movement: says what patients intend.
+        observer: says what is observed, and how well.
         period: control period [s].
-        duration: of an episode [s].
-        steps: control periods of an episode.
-        options: of the solver.
+        duration: length of an episode [s].
+        steps: number of control periods in an episode.
+        options: options of the solver.
 
     Raises:
         InputError: the ecosystem has no gym machine, or the device does not fit the drive.
@@ -185,8 +185,9 @@ class PatientWorld:
     def _observer(self) -> ObserverTables:
         o, k = self.observer, len(self.times)
         return ObserverTables(
-            columns=o.columns, sensors=o.sensors, streams=np.array([stream("tremor"), *o.streams]).view(np.int64),
-            tremor=np.zeros(k), noise=np.zeros((k, o.size)), memory=o.memory(), observation=np.zeros(o.size),
+            columns=o.columns, imperfections=o.imperfections,
+            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(k),
+            noise=np.zeros((k, o.size)), memory=o.memory(), observation=np.zeros(o.size),
         )  # fmt: skip
 
     def _draw(self) -> DrawTables:
@@ -228,7 +229,7 @@ class PatientWorld:
         )  # fmt: skip
 
     def prepare(self, draw: Draw) -> None:
-        """Say who comes next, for `begin_episode`."""
+        """Put the draw of the next episode where `begin_episode` reads it."""
         if self.dynamics.tables is not self.model.tables:
             self._build()
         into = self.tables.draw
@@ -238,15 +239,18 @@ class PatientWorld:
         into.given[:] = draw.load, draw.start, draw.phase
 
     def begin(self) -> int:
-        """Compiled part of an episode's begin; gives what came of it."""
+        """Compiled part of an episode's begin; gives one of the codes of reset.py."""
         return begin_episode(self.packed.table)
 
-    def begun(self, code: int) -> Episode:
-        """The patient at rest at the start of a movement, where the compiled part gave that code.
+    def begun(self, code: int) -> tuple[Draw, Need]:
+        """What was drawn for the episode that has begun, and what its patient lacks.
+
+        Args:
+            code: what the compiled part gave.
 
         Raises:
             InputError: the arm could bring the rope's end to a pulley.
-            SimulationError: no consistent start was found.
+            SimulationError: there is no consistent start, or the motor command does not settle.
         """
         outcome = self.tables.outcome
         if code == NO_RATES and self.dynamics.reorder():
@@ -269,7 +273,7 @@ class PatientWorld:
         need = Need(float(outcome[OUTCOME.ability]), plan.lacking.copy(), float(plan.scale[0]))
         load, start, phase = draw.given.tolist()
         drawn = Draw(int(draw.key.view(np.uint64)[0]), draw.patient.copy(), load, draw.movement.copy(), start, phase)
-        return Episode(self, drawn, need)
+        return drawn, need
 
 
 def _address(kernel: object) -> np.ndarray:

@@ -94,11 +94,11 @@ def test_a_wrong_table_is_named(tmp_path, capsys, text, message):
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--t-end", "-1", "--t-end -1.0: a positive time"),
-        ("--sample", "0", "--sample 0.0: a positive time"),
+        ("--t-end", "-1", "--t-end -1.0: expected a time above 0 s"),
+        ("--sample", "0", "--sample 0.0: expected a time above 0 s"),
         ("--rtol", "0", "rtol = 0.0"),
         ("--start-activation", "0", "a number from 0.01 to 1"),
-        ("--start-deg", "400", "--start-deg 400.0: an angle"),
+        ("--start-deg", "400", "--start-deg 400.0: expected an angle"),
     ],
 )
 def test_an_option_out_of_range_is_named(tmp_path, capsys, option, value, message):

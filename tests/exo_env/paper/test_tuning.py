@@ -4,7 +4,9 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 
+from dms_core.config_files import config_file
 from dms_core.model.control.ziegler_nichols import STEP, oscillation
 from exo_env.__main__ import main
 from exo_env.ecosystem.exoskeleton import Exoskeleton
@@ -34,6 +36,26 @@ def test_the_command_finds_the_shipped_gains(device, tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "Kc = " in printed and "/ 500 = " in printed and "first-order lag of 1 ms" in printed
     assert {p.name for p in tmp_path.iterdir()} == {"tuning.json", "fig06_critical_gain.png", "fig07_tuned.png"}
+
+
+def test_a_device_of_ones_own_is_tuned(device, tmp_path, capsys):
+    """Twice the lag of the motors halves the critical gain, by Kc r = c / T + c^2 / J, of a small second part."""
+    content = yaml.safe_load(config_file("exoskeletons/elbow.yaml").read_text())
+    content["actuator"]["time_constant"] *= 2.0
+    path = tmp_path / "slow.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert main(["tune", "--out", str(tmp_path), "--exoskeleton", str(path)]) == 0
+    critical = json.loads((tmp_path / "tuning.json").read_text())["Kc_N_per_rad"]
+    assert critical == pytest.approx(0.5 * device.tuning.Kc, rel=0.1)
+    assert "first-order lag of 2 ms" in capsys.readouterr().out
+
+
+def test_a_wrong_device_is_named_with_key_and_value(tmp_path, capsys):
+    content = yaml.safe_load(config_file("exoskeletons/elbow.yaml").read_text()) | {"hinge_damping": -1.0}
+    path = tmp_path / "wrong.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert main(["tune", "--out", str(tmp_path), "--exoskeleton", str(path)]) == 2
+    assert "wrong.yaml: Exoskeleton: hinge_damping = -1.0" in capsys.readouterr().err
 
 
 def test_critical_gain_and_period_by_theory(device):

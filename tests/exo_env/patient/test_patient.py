@@ -1,15 +1,18 @@
 """A patient is data: it survives JSON and YAML, refuses what cannot be, and says where each range comes from."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
+from dms_core.config_files import configs
 from dms_core.errors import InputError
 from dms_core.yaml_text import read_yaml
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.person import Person
 from exo_env.patient.patient import LONGEST_DELAY, PATIENT, SHOWN, Patient
+from exo_env.patient.sources import SOURCES
 from exo_env.traits import traits_of
 
 UNITS = ("[kg]", "[m]", "[-]", "[s]", "[s/rad]", "[rad/s]", "[Hz]", "[1/s]", "[rad]", "[1/(s rad)]", "[1/rad]")
@@ -63,9 +66,7 @@ def test_every_number_has_unit_source_and_limits(name):
     assert any(unit in field.description for unit in UNITS)
     limits = {key: getattr(m, key) for m in field.metadata for key in ("ge", "gt", "le") if hasattr(m, key)}
     low, high = limits.get("ge", limits.get("gt")), limits["le"]
-    sourced = "assumed" in field.description or any(
-        f"{author} {year}]" in field.description for author, year in _labels()
-    )
+    sourced = "assumed" in field.description or LABEL.search(field.description)
     # "The same of the extensors" carries the label too; nothing rests on silence.
     assert sourced, field.description
     for bad in (low - 1.0, high + 1.0, float("nan"), float("inf"), "much", None):
@@ -74,14 +75,16 @@ def test_every_number_has_unit_source_and_limits(name):
     assert getattr(Patient(**{name: high}), name) == high
 
 
-def _labels():
-    """(author with bracket, year) of each source in the module's docstring."""
-    import exo_env.patient.patient
+LABEL = re.compile(r"\[([A-Z][A-Za-z-]+ \d{4})\]")
 
-    lines = [line.strip() for line in exo_env.patient.patient.__doc__.splitlines() if line.strip().startswith("[")]
-    labels = [line[: line.index("]")].rsplit(" ", 1) for line in lines]
-    assert len(labels) > 10
-    return labels
+
+def test_labels_of_sources_stand_in_the_table_and_each_is_used():
+    descriptions = [field.description for field in Patient.model_fields.values()]
+    files = [path.read_text() for path in (configs() / "patients").glob("*.yaml")]
+    used = set(LABEL.findall("\n".join([*descriptions, *files])))
+    assert used <= set(SOURCES) and list(SOURCES) == sorted(SOURCES)
+    assert set(SOURCES) == used, set(SOURCES) - used
+    assert all(source.publication and source.about for source in SOURCES.values())
 
 
 def test_delays_fit_into_the_memory():

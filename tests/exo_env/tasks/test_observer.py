@@ -8,7 +8,7 @@ import pytest
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.tasks.channels import Channel, Imperfection, Parts, first_places
 from exo_env.tasks.lift import LiftTask
-from exo_env.tasks.noise import SENSOR, imperfect
+from exo_env.tasks.noise import IMPERFECTION, imperfect
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.repetition import Repetition
 
@@ -54,7 +54,7 @@ def test_noise_delay_and_quantisation():
         noise = generator.standard_normal(observer.size)
         for name, values in (reading | changed).items():
             truth[places[name] :][: np.size(values)] = values
-        imperfect(truth, observer.columns, observer.sensors, memory, noise, begin, out)
+        imperfect(truth, observer.columns, observer.imperfections, memory, noise, begin, out)
         return out.copy()
 
     observed({}, begin=True)
@@ -75,7 +75,10 @@ def test_two_groups_may_show_one_reading():
     device, imu = (s for s in seen.structure if s.name == "angle")
     assert (device.group, imu.group, imu.scale) == ("device", "imu", 2.0)
     assert seen.columns[device.start] == seen.columns[imu.start]
-    assert seen.sensors[imu.start, SENSOR.quantum] == 0.5 and seen.sensors[device.start, SENSOR.quantum] == 0.0015
+    assert (
+        seen.imperfections[imu.start, IMPERFECTION.quantum] == 0.5
+        and seen.imperfections[device.start, IMPERFECTION.quantum] == 0.0015
+    )
     assert len(set(seen.streams.tolist())) == seen.size
 
 

@@ -195,7 +195,7 @@ def test_an_interrupt_waits_for_the_threads(monkeypatch):
     """The caller is interrupted twice, in its own work and while it waits; no thread writes behind its back."""
     batch, done = Batch(4, 12, 5, np.zeros(0, np.int64), threads=2), []
 
-    def slow(counter):
+    def slow(*_):
         if threading.current_thread() is threading.main_thread():
             time.sleep(0.05)
             raise KeyboardInterrupt
@@ -211,7 +211,8 @@ def test_an_interrupt_waits_for_the_threads(monkeypatch):
         return real(jobs)
 
     monkeypatch.setattr(batch_module, "wait", interrupted)
+    monkeypatch.setattr(batch_module, "run_some", slow)
     with pytest.raises(KeyboardInterrupt):
-        batch._share(2, slow)
+        batch.run(np.arange(2), np.zeros((4, 2)))
     assert done == [True] and len(calls) == 2
     batch.close()

@@ -74,7 +74,7 @@ def test_drawn_patients_are_the_quantiles_of_each_field(name):
 
 
 def test_choices_are_checked_by_their_extremes_in_any_order():
-    with pytest.raises(InputError, match=r"lead to 130.0 deg; at most 100.0 deg"):
+    with pytest.raises(InputError, match=r"lead to 130.0 deg, expected at most 100.0 deg"):
         Repetitions(start_deg={"choice": [25.0, 60.0]}, amplitude_deg={"choice": [70.0, 30.0]})
     given = {**population("stroke_mild").fields, "body_mass_index": {"choice": [25.0, 5.0, 26.0]}}
     with pytest.raises(InputError, match="body_mass_index reaches 5.0"):
@@ -104,7 +104,11 @@ def test_the_command_is_that_of_the_internal_model(env):
 @pytest.mark.parametrize(
     ("code", "error", "sentence"),
     [
-        (UNSETTLED, SimulationError, "motor command does not settle: .* may still be wrong by 0.5; below 0.0001"),
+        (
+            UNSETTLED,
+            SimulationError,
+            "motor command does not settle: .* may still be wrong by 0.5, expected less than 0.0001",
+        ),
         (GAPING, SimulationError, "joints stay open by 0.25"),
     ],
 )

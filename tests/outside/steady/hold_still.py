@@ -22,7 +22,7 @@ from exo_env.settings import Settings
 from exo_env.tasks.channels import Channel, Reading
 from exo_env.tasks.elbow import ELBOW, action_channel, device_channels, elbow_readings, read_elbow
 from exo_env.tasks.movement import Movement, Stay
-from exo_env.tasks.task import Task, Told
+from exo_env.tasks.task import Reported, Task
 
 
 class Weights(Settings):
@@ -73,7 +73,7 @@ class HoldStill(Task):
     limits_type: ClassVar = Limits
     movement_type: ClassVar[type[Movement]] = Stay
     events: ClassVar = ("too_fast",)
-    told: ClassVar = (Told("total_tension", "total_tension"),)
+    reported: ClassVar = (Reported("total_tension", "total_tension"),)
     read, judge = read, judge
 
     def declared_readings(self, parts):

@@ -1,0 +1,1 @@
+"""The commands of `python -m exo_env`, one file each."""

@@ -1,0 +1,58 @@
+"""The command `arm26`: the bare arm under a table of excitations."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+from dms_core import Simulation, SolverOptions
+from dms_core.command_line import FAILED_RUN, bar_of_run, moves
+from dms_core.errors import InputError
+from dms_core.model.muscles.activation import MINIMUM
+from dms_core.output_file import check_writable, write_csv
+from exo_env.ecosystem import bare_arm as bare
+
+
+def arm26(
+    excitations: Path,
+    out: Path,
+    t_end: float,
+    start_deg: float = 20.0,
+    start_activation: float = 0.05,
+    rtol: float = SolverOptions.rtol,
+    sample: float = 0.01,
+) -> int:
+    """Drive the bare arm26 by a table of excitations and write its motion, muscles and elbow reaction as CSV.
+
+    Args:
+        excitations: CSV file with the columns time_s [s], BIClong, BICshort, BRA, TRIlong, TRIlat, TRImed [-, 0 to 1];
+            each row holds until the next, and the first stands at 0.
+        out: CSV file to write; its folder is made where it is missing.
+        t_end: end time [s].
+        start_deg: elbow flexion at the start [deg].
+        start_activation: of every muscle at the start, 0.01 to 1 [-].
+        rtol: relative tolerance of the error per step.
+        sample: time between rows [s].
+    """
+    for name, value in (("--t-end", t_end), ("--sample", sample)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"{name} {value}: expected a time above 0 s.")
+    if not -180.0 < start_deg < 180.0:
+        raise InputError(f"--start-deg {start_deg}: expected an angle between -180 and 180 deg.")
+    if not MINIMUM <= start_activation <= 1.0:
+        raise InputError(f"--start-activation {start_activation}: expected a number from {MINIMUM} to 1.")
+    check_writable(out)
+    system = bare.bare_arm(math.radians(start_deg), bare.read_excitations(excitations), start_activation)
+    simulation = Simulation(system, SolverOptions(rtol=rtol))
+    with bar_of_run(t_end) as bar:
+        simulation.advance(t_end, moves(bar))
+    trajectory = simulation.trajectory()
+    write_csv(out, bare.table(trajectory, sample))
+    print(f"{trajectory.message} {trajectory.stats.steps} steps. Written: {out}")
+    for warning in bare.warnings(trajectory):
+        print(f"warning: {warning}", file=sys.stderr)
+    if not trajectory.success:
+        print(f"The run failed; '{out}' holds the part before.", file=sys.stderr)
+        return FAILED_RUN
+    return 0

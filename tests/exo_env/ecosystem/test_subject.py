@@ -1,0 +1,57 @@
+"""The file of a subject: every mistake by file, key and value."""
+
+import copy
+
+import pytest
+import yaml
+
+from dms_core.config_files import config_file
+from dms_core.errors import InputError
+from exo_env.ecosystem.subject import subject_facts
+
+ARM26 = yaml.safe_load(config_file("subject/arm26.yaml").read_text())
+
+
+def test_the_shipped_file_is_read_as_it_is():
+    assert subject_facts("arm26") == ARM26
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "complaint"),
+    [
+        (("roles",), None, "'roles' is missing"),
+        (("roles", "elbow"), None, "roles: RoleFacts: 'elbow' is missing"),
+        (("roles",), ["elbow"], "roles = "),
+        (("roles", "flexors"), "BIClong", "roles: RoleFacts: flexors = 'BIClong'"),
+        (("roles", "flexors"), ["biceps"], "roles: flexors = 'biceps'; expected one of the muscles BIClong"),
+        (("roles", "forearm"), "ulna", "roles: forearm = 'ulna'; expected one of the bodies base"),
+        (("gravity",), [0.0, -9.8], "gravity.2"),
+        (("bodies", "r_humerus", "mass"), None, "bodies.r_humerus: BodyFacts: 'mass' is missing"),
+        (("bodies", "r_humerus", "mass"), -1.0, "bodies.r_humerus: BodyFacts: mass = -1.0"),
+        (("joints", "r_elbow", "axis_i"), None, "joints.r_elbow: 'axis_i' is missing"),
+        (("joints", "r_elbow", "point_i"), "here", "joints.r_elbow: JointFacts: point_i = 'here'"),
+        (("muscles",), {}, "muscles = {}"),
+        (("muscles", "BRA", "optimal_fibre_length"), None, "muscles.BRA: 'optimal_fibre_length' is missing"),
+        (("muscles", "BRA", "path"), [], "muscles.BRA: MuscleFacts: path = []"),
+        (
+            ("muscles", "BRA", "path"),
+            [{"body": "moon", "point": [0.0, 0.0, 0.0]}] * 2,
+            "muscles.BRA.path: body = 'moon': expected one of base",
+        ),
+        (("muscle_defaults", "activation_time_constant"), None, "'activation_time_constant' is missing"),
+    ],
+)
+def test_mistakes_are_named(tmp_path, keys, value, complaint):
+    facts = copy.deepcopy(ARM26)
+    place = facts
+    for key in keys[:-1]:
+        place = place[key]
+    if value is None:
+        del place[keys[-1]]
+    else:
+        place[keys[-1]] = value
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(facts))
+    with pytest.raises(InputError) as caught:
+        subject_facts(str(path))
+    assert str(path) in str(caught.value) and complaint in str(caught.value)
