@@ -3,7 +3,7 @@
 A world is two packed tables (arena.py): m, its constant tables (`World.tables`), and s, its state (`World.packed`).
 Compiled code takes views of their fields by name and calls, without touching a Python object:
 
-    advance(m, s, o, t_end, record, 0)    steps to t_end; gives (code, rows recorded)
+    advance(m, s, o, t_end, record, 0)    steps to t_end; gives (a code of OUTCOME, rows recorded)
     restart(m, s, o)                      accelerations and multipliers behind a jump; False if there are none
     rewind(s, q, v, step)                 back to t = 0 at other coordinates and rates
     read_sensors(sensing, signals, t, q, v, vd, lam, behind, y)     all sensors of one state
@@ -14,7 +14,7 @@ gives it, `call_with_table` calls it, and one compiled loop serves every functio
 """
 
 from dms_core.assembly.sensing import read_sensors
-from dms_core.assembly.tables import SIGNALS
+from dms_core.assembly.tables import MODEL, SIGNALS
 from dms_core.compiled.arena import (
     Packed,
     fields,
@@ -32,14 +32,21 @@ from dms_core.compiled.calls import TABLE_CALL, address, call_with_table
 from dms_core.compiled.compilation import drop_stale_code
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.newton import largest_errors
-from dms_core.simulation.parts import CONSTRAINTS, run_part
-from dms_core.simulation.state import MODEL, STATE, Options, T, rewind
-from dms_core.simulation.step_control import DONE, MATRIX_SINGULAR, advance, restart
+from dms_core.simulation.parts import PARTS, advance, restart, run_part
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, rewind
+from dms_core.simulation.step_control import OUTCOME
+
+T = CLOCK.t
+DONE, MATRIX_SINGULAR = OUTCOME.done, OUTCOME.matrix_singular
 
 __all__ = [
+    "CLOCK",
+    "COUNTS",
     "DONE",
+    "LARGEST",
     "MATRIX_SINGULAR",
     "MODEL",
+    "OUTCOME",
     "SIGNALS",
     "STATE",
     "TABLE_CALL",
@@ -71,5 +78,5 @@ __all__ = [
 @compiled
 def constraint_gap(m, s):
     """Largest |phi| of the present state [m or -]."""
-    run_part(m, s, CONSTRAINTS)
+    run_part(m, s, PARTS.constraints)
     return largest_errors(s)[0]

@@ -40,9 +40,10 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numba import float64, int32, int64, types
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from dms_core.errors import DmsError, ModelError, choices
+from dms_core.errors import DmsError, ModelError
+from dms_core.validation import Checked
 
 _I = types.Array(int32, 1, "C")
 _A = types.Array(float64, 1, "C")
@@ -75,6 +76,30 @@ class Coordinate(NamedTuple):
     itself (a first-order state: fibre length, activation), which then is an algebraic variable."""
 
 
+class Compositions(NamedTuple):
+    """How a sensor is evaluated; a composed one needs no kernel."""
+
+    none: int = 0
+    """By its own kernel."""
+    reaction: int = 1
+    """Load of `Placement.constraint` on one of its bodies. Integers: offset of that body, of the body whose axes are
+    used (-1: the ground); numbers: the point, from the centre of mass."""
+    joint_moment: int = 2
+    """Moment of `Placement.sources` on all bodies of the placement but the first. Numbers: centre and axis on the
+    first body, see MOMENT."""
+
+
+class MomentNumbers(NamedTuple):
+    """Places of the numbers of a joint moment."""
+
+    centre: int = 0
+    """From the centre of mass [m]."""
+    axis: int = 3
+
+
+COMPOSITIONS, MOMENT = Compositions(), MomentNumbers()
+
+
 class Pattern(NamedTuple):
     """Which local derivatives can be non-zero: boolean, shapes (n, n) each."""
 
@@ -105,7 +130,7 @@ class Placement:
     constraint: str = ""
     """Sensors only: the constraint whose multipliers are handed in as lam."""
     sources: tuple[str, ...] = field(default=())
-    """Composite sensors only: elements whose own kernels are evaluated first."""
+    """Composed sensors only: elements whose own kernels are evaluated first."""
 
     @property
     def size(self) -> int:
@@ -113,40 +138,12 @@ class Placement:
         return 7 * len(self.bodies) + len(self.coordinates)
 
 
-class Declaration(BaseModel):
+class Declaration(Checked):
     """A named, frozen, validated part of a system. Wrong values raise ModelError with name, key and value."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    wrong: ClassVar[type[DmsError]] = ModelError
     kind: ClassVar[str] = ""
     name: str = Field(min_length=1, description="unique name")
-
-    def __init__(self, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise ModelError(explain(type(self), data, error)) from None
-
-
-def explain(cls: type[BaseModel], data: dict[str, Any], error: ValidationError) -> str:
-    """One sentence per mistake: which element, which key, what value, what would be right."""
-    label = getattr(cls, "kind", "") or cls.__name__
-    who = f"{label} '{data.get('name', '?')}'" if "name" in cls.model_fields else label
-    lines = []
-    for e in error.errors():
-        key = ".".join(str(x) for x in e["loc"])
-        right = e["msg"].removeprefix("Value error, ").removeprefix("Input ").rstrip(".")
-        if e["type"] == "extra_forbidden":
-            lines.append(f"{who}: unknown key '{key}'. Allowed: {choices(cls.model_fields)}.")
-        elif e["type"] == "missing":
-            lines.append(f"{who}: '{key}' is missing.")
-        elif not key:
-            lines.append(f"{who}: {right}.")
-        elif isinstance(e.get("ctx", {}).get("error"), DmsError):
-            # A part with checks of its own (a path point, a signal) has named key and value already.
-            lines.append(f"{who}: {key}: {right}.")
-        else:
-            lines.append(f"{who}: {key} = {e['input']!r}: {right}.")
-    return "\n".join(lines)
 
 
 class DynamicElement(Declaration):
@@ -185,10 +182,27 @@ class Constraint(Declaration):
     """Equations phi(q, u) = 0."""
 
     kernel: ClassVar[Any] = None
+    own_points: ClassVar[tuple[int, ...]] = ()
+    """Places in `Placement.numbers` of the constraint's own point on its first and its second body, from the centre of
+    mass [m]: where a reaction is measured by default. Without them that is the centre of mass."""
 
     def rows(self) -> tuple[str, ...]:
         """Names of the equations, in the kernel's order."""
         raise NotImplementedError
+
+    def aligned(self, numbers: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Directions of the first body and those of the second that coincide with them, as rows, shapes (k, 3) each.
+
+        A joint whose equations also hold with a body turned over declares them, so that assembly can refuse that.
+
+        Args:
+            numbers: those of the placement.
+        """
+        return np.zeros((0, 3)), np.zeros((0, 3))
+
+    def welded(self) -> tuple[str, ...]:
+        """Bodies that this constraint leaves no freedom relative to each other; none unless it is a weld."""
+        return ()
 
     def place(self, system) -> Placement:
         """Bodies, coordinates, inputs and tables of the kernel call."""
@@ -199,6 +213,7 @@ class Sensor(Declaration):
     """Measured quantities y = h(q, v, vdot, lam, u)."""
 
     kernel: ClassVar[Any] = None
+    composition: ClassVar[int] = COMPOSITIONS.none
 
     def outputs(self) -> tuple[tuple[str, str], ...]:
         """(name, unit) of each component; names are suffixes of the sensor's own name, '' for a scalar."""

@@ -15,9 +15,9 @@ from gymnasium import spaces
 from dms_core import SolverOptions
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, choices
+from dms_core.kernels import DONE, MATRIX_SINGULAR
 from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
-from dms_core.simulation.step_control import DONE, MATRIX_SINGULAR
 from exo_env.drives.drive import checked_action, drive
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.envs.settings import SOLVER_OPTIONS, TIME, load_distribution, within, worn_device

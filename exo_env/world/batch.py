@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dms_core.compiled.arena import Packed, floats, ints, table_at
-from dms_core.simulation.step_control import DONE
+from dms_core.kernels import DONE, Packed, floats, ints, table_at
 from exo_env.jit import compiled
 from exo_env.patient.effort import STATE as EFFORT
 from exo_env.tasks.rewards import TERMS

@@ -14,11 +14,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.sensing import read_sensors
-from dms_core.assembly.tables import SIGNALS
-from dms_core.compiled.arena import Packed, fields, floats, inner, ints, matrix
-from dms_core.simulation.state import STATE, Options, T
-from dms_core.simulation.step_control import DONE, advance
+from dms_core.kernels import (
+    DONE,
+    SIGNALS,
+    STATE,
+    Options,
+    Packed,
+    T,
+    advance,
+    fields,
+    floats,
+    inner,
+    ints,
+    matrix,
+    read_sensors,
+)
 from exo_env.jit import compiled
 from exo_env.patient.effort import SIGN as FLEXION
 from exo_env.patient.effort import STATE as EFFORT

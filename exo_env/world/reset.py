@@ -14,13 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.tables import SIGNALS
-from dms_core.compiled.arena import fields, flags, floats, inner, ints, matrix
+from dms_core.kernels import SIGNALS, STATE, fields, flags, floats, inner, ints, matrix, restart, rewind
 from dms_core.model.geometry.rotations import dot, vec
 from dms_core.simulation.newton import largest_errors
-from dms_core.simulation.parts import CONSTRAINTS, run_part
-from dms_core.simulation.state import STATE, rewind
-from dms_core.simulation.step_control import restart
+from dms_core.simulation.parts import PARTS, run_part
 from exo_env.ecosystem.exoskeleton import link_moment, rope_lever
 from exo_env.ecosystem.gym_machine import clearances
 from exo_env.jit import compiled
@@ -299,7 +296,7 @@ def settle(p, s):
     w, m = inner(p, PLANT.world), inner(p, PLANT.model)
     if not restart(m, w, options_of(p)):
         return NO_RATES
-    run_part(m, w, CONSTRAINTS)
+    run_part(m, w, PARTS.constraints)
     gap = largest_errors(w)[0]
     floats(s, SETTING.found)[FOUND.gap] = gap
     if not gap <= CLOSED:

@@ -7,25 +7,38 @@ With stiffness and damping 0 it integrates g u twice.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
+from dms_core.model.places import numbers_at
+
+
+class SecondOrderNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    mass: int = 0
+    damping: int = 1
+    stiffness: int = 2
+    gain: int = 3
+
+
+SECOND = SecondOrderNumbers()
 
 
 @compiled
 def second_order(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: has an input. par: m, c, k, g."""
-    r[0] += par[0] * a[0] + par[1] * v[0] + par[2] * q[0]
+    """ip: has an input."""
+    r[0] += par[SECOND.mass] * a[0] + par[SECOND.damping] * v[0] + par[SECOND.stiffness] * q[0]
     if ip[0] == 1:
-        r[0] -= par[3] * u[0, 0]
+        r[0] -= par[SECOND.gain] * u[0, 0]
     if level > 0:
-        Ja[0, 0] += par[0]
-        Jv[0, 0] += par[1]
-        Jq[0, 0] += par[2]
+        Ja[0, 0] += par[SECOND.mass]
+        Jv[0, 0] += par[SECOND.damping]
+        Jq[0, 0] += par[SECOND.stiffness]
 
 
 class SecondOrder(Force):
@@ -58,6 +71,6 @@ class SecondOrder(Force):
             coordinates=(f"{self.name}.x",),
             inputs=self.input_names(),
             integers=(int(self.input is not None),),
-            numbers=(self.mass, self.damping, self.stiffness, self.gain),
+            numbers=numbers_at(SECOND, mass=self.mass, damping=self.damping, stiffness=self.stiffness, gain=self.gain),
             pattern=Pattern(one, one, one),
         )

@@ -11,6 +11,7 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.residual import evaluate_inputs, evaluate_newton, evaluate_rates, evaluate_residual
 from dms_core.assembly.sensing import SENSING
 from dms_core.assembly.sparsity import newton_pattern, rate_pattern
+from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import Packed, inner
 from dms_core.errors import AssemblyError, ModelError
 from dms_core.linear.rank import minimum_norm, minimum_norms
@@ -20,7 +21,7 @@ from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate
 from dms_core.simulation.initial_rates import consistent_rates
 from dms_core.simulation.linear_solve import back_substitute, factorise
 from dms_core.simulation.newton import apply, right_hand_side, set_rates
-from dms_core.simulation.state import MODEL, STATE
+from dms_core.simulation.state import STATE
 from tests.dms_core.assembly.specimen import BODIES, CONSTRAINTS, FORCES, random_point, scales, specimen
 from tests.dms_core.test_derivatives import CONCRETE, differences
 
@@ -156,7 +157,7 @@ def test_start_satisfies_every_equation(model):
     simulation = Simulation(model)
     m, s, w = model.tables.table, simulation._world.table, simulation.state.w
     evaluate_inputs(inner(s, STATE.signals), 0.0, False, inner(s, STATE.w))
-    assert consistent_rates(m, s)
+    assert consistent_rates(m, s, 0.0)
     state = simulation.state
     x = (state.q[None], state.v[None], state.vd[None], state.lam[None])
     w.lam[:] = model.whole_multipliers(state.signals, np.zeros(1), *x, np.ones(1, bool))[0]
