@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.layout import Layout, same_structure
+from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import (
     dense_constraints,
     dense_jacobians,
@@ -18,7 +21,7 @@ from dms_core.assembly.residual import (
     evaluate_newton,
     evaluate_rates,
 )
-from dms_core.assembly.sensing import Partials, Sensing, composition, evaluate_partials, measure
+from dms_core.assembly.sensing import Partials, Sensing, composition, measure
 from dms_core.assembly.sparsity import moved, newton_pattern, rate_pattern
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Calls, Signals, Work, new_work, signal_tables
@@ -188,7 +191,7 @@ class Model:
 
     def new_state(self) -> Packed:
         """A world (a packed State) at the consistent start, with inputs of its own."""
-        signals = self._signals._replace(c=self._signals.c.copy())
+        signals = self._signals._replace(c=self._signals.c.copy(), t=self._signals.t.copy())
         return new_state(self._tables.values, self.new_work(), signals, self.start.q, self.start.v)
 
     @property
@@ -344,16 +347,24 @@ class Model:
             self._recover(inner(world, STATE.signals), t, q, v, a, lam, behind)
         measure(self.sensing.table, inner(world, STATE.signals), t, q, v, a, lam, behind, y)
 
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """Residual and sensors with their derivatives at any operating point."""
+        return Derivatives(self)
+
+    @cached_property
+    def parameter_derivatives(self) -> ParameterDerivatives:
+        """Derivatives of residual and sensors by declared numbers."""
+        return ParameterDerivatives(self)
+
     def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
-        """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense."""
-        n_y, w = len(self.layout.outputs), self._sensor_work.values
-        w.q[: self.n_q], w.v[: self.n_q], w.a[: self.n_q], w.lam[:] = q, v, a, lam
+        """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense.
+
+        Inputs are the declared ones at t; those by u are by their values. `World.sensor_blocks` takes a world's inputs.
+        """
+        w, n = self._sensor_work.values, self.n_q
+        w.q[:n], w.v[:n], w.a[:n], w.lam[:] = q, v, a, lam
         evaluate_inputs(Packed(self._signals).table, t, False, self._sensor_work.table)
-        shapes = (self.n_q + 7, self.n_q + 7, self.n_q + 7, self.n_phi, len(self.layout.input_index))
-        into = Partials(*(np.zeros((n_y, k)) for k in shapes))
-        packed = Packed(into)
-        evaluate_partials(
-            self._dynamics.table, self._constraints.table, self._sensors.table, self._composed.table,
-            self._sensor_work.table, packed.table,
-        )  # fmt: skip
-        return Partials(into.q[:, : self.n_q], into.v[:, : self.n_q], into.a[:, : self.n_q], into.lam, into.u)
+        into = self.derivatives.partials()
+        by_input = into.u + self.derivatives.inputs.of_moments()[:, :, 0]
+        return Partials(into.q[:, :n], into.v[:, :n], into.a[:, :n], into.lam, by_input)
