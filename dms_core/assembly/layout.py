@@ -79,7 +79,7 @@ class Layout:
 
     @cached_property
     def digest(self) -> str:
-        """Equal for two layouts exactly if `same_structure` holds, in this process or another."""
+        """Equal where `same_structure` holds, in this process or another; classes are known by their names."""
         calls = [*self.dynamics, *self.constraints, *self.sensors]
         parts = [
             (f"{type(c.element).__module__}.{type(c.element).__qualname__}", c.iq.tolist(), c.iu.tolist(),

@@ -3,6 +3,7 @@
 That is the present state (q, v, qdot, vdot, lam, mu), the past of the method, clock and counts, the inputs as they were
 set, the factorised matrices that are still in use, and the order of elimination, which may have been chosen anew. The
 model is not part of it: a snapshot names its model by the structure and by all numbers of it, and goes into no other.
+Inputs that are functions of time, and kernels, are told apart by their names only.
 """
 
 from __future__ import annotations

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 import dms_core.model
+from dms_core.compiled.entries import derivative_kernel
 from dms_core.model.element import Constraint, DynamicElement, Sensor
 from tests.example_elements import composites, examples
 from tests.example_elements.kernel_call import KernelCall, kernel_calls
@@ -170,6 +171,15 @@ def test_every_kind_has_an_example(kind):
     assert examples().get(kind), f"'{kind}' has no example in tests/example_elements"
     for function in examples()[kind]:
         assert type(function().element) is CONCRETE[kind], f"{function.__name__} is no example of '{kind}'"
+
+
+@pytest.mark.parametrize("kind", sorted(k for k, c in CONCRETE.items() if issubclass(c, DynamicElement)))
+def test_what_can_read_inputs_gives_derivatives_by_them(kind):
+    """By the declaration, so that an element whose examples read none does not escape."""
+    cls = CONCRETE[kind]
+    if cls.input_names is not DynamicElement.input_names:
+        assert derivative_kernel(cls, "input_kernel") is not None, f"'{kind}' can read inputs and has no input_kernel"
+        assert any(call.placement.inputs for f in examples()[kind] for call in kernel_calls(f())), kind
 
 
 def test_every_example_is_of_a_known_kind():

@@ -80,7 +80,9 @@ def test_numbers_that_were_written_in_place_count(model):
     before = world.parameter_blocks("filter", "damping", at).r2
     k = own.layout.index["filter.setpoint"]
     call = next(e for e, c in enumerate(own.layout.dynamics) if c.element.name == "filter")
-    own.numbers[0][own._dynamics.values.par_ptr[call]] *= 2.0  # the frequency, which multiplies the damping
+    own.numbers[0][own.sensing.values.dynamics.values.par_ptr[call]] *= (
+        2.0  # the frequency, which multiplies the damping
+    )
     assert world.parameter_blocks("filter", "damping", at).r2[k] == pytest.approx(2.0 * before[k], rel=1e-9)
 
 

@@ -105,10 +105,14 @@ def test_going_on_gives_the_same_bits(hanging, method, prepare):
     assert _go_on(other, "hand", 1.0) == first
 
 
+@pytest.mark.parametrize("reordered", [False, True])
 @pytest.mark.parametrize("method", METHODS)
-def test_muscles_controllers_and_welds_go_on_alike(everything, method):
+def test_muscles_controllers_and_welds_go_on_alike(everything, method, reordered):
     world = _world(everything, method)
     world.advance(0.02)
+    if reordered:
+        assert world.reorder()
+        world.advance(0.03)
     past = world.snapshot()
     first = _go_on(world, "command", 0.05)
     other = _world(everything, method)
