@@ -6,7 +6,9 @@ ground reads and writes like any other; what it writes to the ground's rows fall
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -74,6 +76,19 @@ class Layout:
             parts = sensor.outputs()
             self.sensors.append(self._call(sensor, _placed(sensor, system)[0], len(self.outputs), len(parts)))
             self.outputs += [(f"{sensor.name}.{part}" if part else sensor.name, unit) for part, unit in parts]
+
+    @cached_property
+    def digest(self) -> str:
+        """Equal where `same_structure` holds, in this process or another; classes are known by their names."""
+        calls = [*self.dynamics, *self.constraints, *self.sensors]
+        parts = [
+            (f"{type(c.element).__module__}.{type(c.element).__qualname__}", c.iq.tolist(), c.iu.tolist(),
+             list(c.placement.integers))
+            for c in calls
+        ]  # fmt: skip
+        counts = [len(x) for x in (self.dynamics, self.constraints, self.sensors)]
+        everything = (self.names, self.row_names, self.outputs, sorted(self.input_index.items()), counts, parts)
+        return hashlib.sha256(repr(everything).encode()).hexdigest()
 
     def body_indices(self, name: str) -> np.ndarray:
         """Global indices of a body's seven local coordinates."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import warnings
+from functools import cached_property
 
 import numpy as np
 
+from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.layout import Layout, same_structure
 from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
+from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs
-from dms_core.assembly.sensing import Partials, composition, evaluate_partials, measure, new_sensing
+from dms_core.assembly.sensing import Partials, composition, measure, new_sensing
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
 from dms_core.compiled.arena import Packed
@@ -108,7 +111,7 @@ class Model:
 
     def new_signals(self) -> Signals:
         """The declared inputs, whose values may be set: a copy for one world."""
-        return self._signals._replace(c=self._signals.c.copy())
+        return self._signals._replace(c=self._signals.c.copy(), t=self._signals.t.copy())
 
     @property
     def numbers(self) -> tuple[np.ndarray, ...]:
@@ -220,16 +223,24 @@ class Model:
             self._recover(signals, t, q, v, a, lam, behind)
         measure(self.sensing.table, signals, t, q, v, a, lam, behind, y)
 
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """Residual and sensors with their derivatives at any operating point."""
+        return Derivatives(self)
+
+    @cached_property
+    def parameter_derivatives(self) -> ParameterDerivatives:
+        """Derivatives of residual and sensors by declared numbers."""
+        return ParameterDerivatives(self)
+
     def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
-        """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense."""
-        n_y, w = len(self.layout.outputs), self._sensor_work.values
-        w.q[: self.n_q], w.v[: self.n_q], w.a[: self.n_q], w.lam[:] = q, v, a, lam
+        """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense.
+
+        Inputs are the declared ones at t; those by u are by their values. `World.sensor_blocks` takes a world's inputs.
+        """
+        w, n = self._sensor_work.values, self.n_q
+        w.q[:n], w.v[:n], w.a[:n], w.lam[:] = q, v, a, lam
         evaluate_inputs(Packed(self._signals).table, t, False, self._sensor_work.table)
-        shapes = (self.n_q + 7, self.n_q + 7, self.n_q + 7, self.n_phi, len(self.layout.input_index))
-        into = Partials(*(np.zeros((n_y, k)) for k in shapes))
-        packed = Packed(into)
-        evaluate_partials(
-            self._dynamics.table, self._constraints.table, self._sensors.table, self._composed.table,
-            self._sensor_work.table, packed.table,
-        )  # fmt: skip
-        return Partials(into.q[:, : self.n_q], into.v[:, : self.n_q], into.a[:, : self.n_q], into.lam, into.u)
+        into = self.derivatives.partials()
+        by_input = into.u + self.derivatives.inputs.of_moments()[:, :, 0]
+        return Partials(into.q[:, :n], into.v[:, :n], into.a[:, :n], into.lam, by_input)

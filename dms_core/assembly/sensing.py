@@ -50,8 +50,8 @@ class Partials(NamedTuple):
 
     Shapes (n_y, n_q + 7) three times, (n_y, n_phi), (n_y, n_u).
 
-    The derivative of a joint moment by an input that drives one of its elements is missing and stands as 0: forces have
-    no derivative by inputs in their contract yet.
+    What an input does to a joint moment through one of its elements is not in u here: `evaluate_partials` knows sensors
+    only, and InputDerivatives.of_moments (input_derivatives.py) gives that share.
     """
 
     q: np.ndarray

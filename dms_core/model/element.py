@@ -27,6 +27,19 @@ Sensor kernel: y = h(q, v, vdot, lam, u)
     kernel(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu)
 
 `ip` and `par` are the integers and numbers of `Placement`; `u[k]` is (value, rate, second derivative) of input k.
+A sensor reads values of inputs only, and Yu[i, k] is the derivative of y[i] by the value of input k.
+
+Derivatives by inputs and parameters are asked for by estimation, sensitivities and linearisation, never by a step. A
+dynamic element may have two more compiled functions for them; outputs are zero before each call:
+
+    input_kernel(ip, par, q, v, a, u, Ju)          Ju[i, k, j]  derivative of r[i] by u[k, j]
+    parameter_kernel(ip, par, q, v, a, u, Jp)      Jp[i, p]     derivative of r[i] by par[p], for every p
+
+They are called only for placements with inputs, and with numbers. Where an element has none, or a subclass has a
+kernel of its own and inherits the other, the kernel is differentiated by central differences, and the result names the
+element (input_derivatives.py, parameter_derivatives.py). Constraints need no such function: what a kernel writes into
+phi_t for given rates of its inputs tells the derivative by them. Derivatives of constraints and sensors by parameters
+are differences.
 
 An element whose own coordinates depend on the assembled position (a fibre in equilibrium, a controller's error) may
 have a method `start_states(system, q, u)` that gives one pair (value, rate) for each coordinate it owns, from the local
@@ -52,6 +65,8 @@ _B = types.Array(float64, 2, "C")
 DYNAMIC = types.void(_I, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B)
 CONSTRAINT = types.void(_I, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B, _B)
 SENSOR = types.void(_I, _A, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B, _B, _B)
+INPUT_DERIVATIVE = types.void(_I, _A, _A, _A, _A, _B, types.Array(float64, 3, "C"))
+PARAMETER_DERIVATIVE = types.void(_I, _A, _A, _A, _A, _B, _B)
 
 GROUND = "ground"
 
@@ -150,6 +165,10 @@ class DynamicElement(Declaration):
     """Anything that writes rows of M vdot + phi_q^T lam - f = 0."""
 
     kernel: ClassVar[Any] = None
+    input_kernel: ClassVar[Any] = None
+    """Derivatives of the rows by inputs; None where they are to be found by differences."""
+    parameter_kernel: ClassVar[Any] = None
+    """Derivatives of the rows by the numbers of the placement; None where they are to be found by differences."""
 
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Coordinates this element owns, by local name; the system prefixes '<element>.'."""

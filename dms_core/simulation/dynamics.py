@@ -17,7 +17,9 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
+from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.parts import advance, restart
+from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, State, new_state, with_tables
 from dms_core.simulation.step_control import OUTCOME
 
@@ -78,7 +80,7 @@ class SolverOptions:
         )  # fmt: skip
 
 
-class World:
+class World(Inspection):
     """One world that is advanced in time, with inputs set between calls; it remembers the present only.
 
     Args:
@@ -257,6 +259,19 @@ class Simulation(World):
 
     def _keep(self, rows: np.ndarray) -> None:
         self._rows.append(rows.copy())
+
+    def restore(self, past: Snapshot) -> None:
+        """As in World. What was recorded is forgotten: the trajectory begins at the restored time.
+
+        Raises:
+            InputError: the snapshot belongs to another model, to other numbers of it, or to other options.
+        """
+        super().restore(past)
+        s = self.state
+        self._settings = {}
+        # At the start and behind a jump the next step records where it begins, with rates that belong to it.
+        present = np.concatenate([[self.time], s.q, s.v, s.vd, s.lam, s.mu])
+        self._rows = [present[None]] if not s.counts[COUNTS.restart] else []
 
     def trajectory(self) -> Trajectory:
         """Everything computed so far."""

@@ -94,6 +94,17 @@ def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jv[3 + i, 3 + k] += 8.0 * (dv1[i] + dv2[i])
 
 
+@compiled
+def rigid_body_by_parameter(ip, par, q, v, a, u, Jp):
+    """The rows by mass and inertia, in which they are linear: those of each number 1 with all others 0."""
+    for k in range(7):
+        one, column, unused = np.zeros(7), np.zeros(7), np.zeros((1, 1))
+        one[k] = 1.0
+        rigid_body(ip, one, q, v, a, u, 0, column, unused, unused, unused)
+        for i in range(7):
+            Jp[i, k] = column[i]
+
+
 class RigidBody(Body):
     """A rigid body. Attachment points elsewhere are given in its reference frame.
 
@@ -103,6 +114,7 @@ class RigidBody(Body):
 
     kind: ClassVar[str] = "rigid_body"
     kernel: ClassVar = rigid_body
+    parameter_kernel: ClassVar = rigid_body_by_parameter
     mass: float = Field(gt=0.0, description="mass [kg]")
     inertia: tuple[float, ...] = Field(
         description="about the centre of mass, in reference axes [kg m^2]: (xx, yy, zz) or (xx, yy, zz, xy, xz, yz)"

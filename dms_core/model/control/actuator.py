@@ -101,6 +101,18 @@ def rope_actuator(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         Jv[0, 0] = T
 
 
+@compiled
+def rope_actuator_by_input(ip, par, q, v, a, u, Ju):
+    """The row by the command or the authority; a command outside its limits moves nothing."""
+    limit = par[ACTUATOR.limit]
+    if ip[0] == 0:
+        inside = u[0, 0] > 0.0 and (limit <= 0.0 or u[0, 0] < limit)
+        Ju[0, 0, 0] = -1.0 if inside else 0.0
+    elif ip[1] > 0:
+        command = par[ACTUATOR.ki] * q[1] + par[ACTUATOR.kp] * v[1] + par[ACTUATOR.kd] * a[1]
+        Ju[0, 0, 0] = -pulled_tension(u[0, 0] * command, par[ACTUATOR.width], limit)[1] * command
+
+
 class RopeActuator(Force):
     """A motor that pulls a rope: owns the coordinate 'tension' [N], which ropes read.
 
@@ -109,6 +121,7 @@ class RopeActuator(Force):
 
     kind: ClassVar[str] = "rope_actuator"
     kernel: ClassVar = rope_actuator
+    input_kernel: ClassVar = rope_actuator_by_input
     command: str | None = Field(default=None, description="name of the input that commands a tension [N]")
     pid: str | None = Field(default=None, description="name of the PID controller that commands the tension")
     sign: Literal[1, -1] = Field(

@@ -58,11 +58,18 @@ def delayed_error(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jq[k, k - 1] = -1.0
 
 
+@compiled
+def delayed_error_by_input(ip, par, q, v, a, u, Ju):
+    """The row of the first lag by the reference: -1."""
+    Ju[OWN, 0, 0] = -1.0
+
+
 class DelayedError(Force):
     """Delayed error of a revolute joint's angle against a reference. It exerts no force."""
 
     kind: ClassVar[str] = "delayed_error"
     kernel: ClassVar = delayed_error
+    input_kernel: ClassVar = delayed_error_by_input
     joint: str = Field(description="name of the revolute joint whose angle theta is sensed")
     reference: str = Field(description="name of the input psi(t) [rad]")
     delay: float = Field(gt=0.0, description="mean delay D [s]")

@@ -72,6 +72,14 @@ def pid(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
             Jv[OWN, FILTER] = -1.0
 
 
+@compiled
+def pid_by_input(ip, par, q, v, a, u, Ju):
+    """The row by psi and psidot."""
+    if ip[0] > 0:
+        Ju[OWN, 0, 0] = -par[PID.drift_gain]
+        Ju[OWN, 0, 1] = -1.0
+
+
 class Pid(Force):
     """PID controller of the angle of a revolute joint. It exerts no force; actuators read its command.
 
@@ -80,6 +88,7 @@ class Pid(Force):
 
     kind: ClassVar[str] = "pid"
     kernel: ClassVar = pid
+    input_kernel: ClassVar = pid_by_input
     joint: str = Field(description="name of the revolute joint whose angle theta is controlled")
     reference: str | None = Field(default=None, description="name of the input psi(t) [rad]; None means 0")
     offset: str | None = Field(

@@ -77,11 +77,26 @@ def lumped_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         _lumped_load_derivatives(q, s, F, F_b, m, sign, factor, follows, Jq)
 
 
+@compiled
+def lumped_load_by_input(ip, par, q, v, a, u, Ju):
+    """The rows of the body by the factor: the load of factor 1."""
+    s, F, m = vec(par, LOAD.point), vec(par, LOAD.force), vec(par, LOAD.moment)
+    sign = 1.0 if ip[0] == 1 else -1.0
+    if ip[0] == 1:
+        F = rotated(q, 0, F)
+    d, x = columns(q, 0, s), _moment(euler_parameters(q, 0), m, sign)
+    for i in range(3):
+        Ju[i, 0, 0] = -F[i]
+    for n in range(4):
+        Ju[3 + n, 0, 0] = -dot(d[n], F) - 2.0 * x[n]
+
+
 class LumpedLoad(Force):
     """Force and moment on a body, constant or multiplied by an input."""
 
     kind: ClassVar[str] = "lumped_load"
     kernel: ClassVar = lumped_load
+    input_kernel: ClassVar = lumped_load_by_input
     body: str = Field(description="loaded body")
     point: Vector = Field(default=(0.0, 0.0, 0.0), description="point of attack in the frame of the body [m]")
     force: Vector = Field(default=(0.0, 0.0, 0.0), description="force [N]")

@@ -41,11 +41,27 @@ def second_order(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         Jq[0, 0] += par[SECOND.stiffness]
 
 
+@compiled
+def second_order_by_input(ip, par, q, v, a, u, Ju):
+    """The row by the input: -g."""
+    Ju[0, 0, 0] = -par[SECOND.gain]
+
+
+@compiled
+def second_order_by_parameter(ip, par, q, v, a, u, Jp):
+    """The row by m, c, k, g."""
+    Jp[0, SECOND.mass], Jp[0, SECOND.damping], Jp[0, SECOND.stiffness] = a[0], v[0], q[0]
+    if ip[0] == 1:
+        Jp[0, SECOND.gain] = -u[0, 0]
+
+
 class SecondOrder(Force):
     """A coordinate x with mass, damping and stiffness, driven by g u. Its coordinate is '<name>.x'."""
 
     kind: ClassVar[str] = "second_order"
     kernel: ClassVar = second_order
+    input_kernel: ClassVar = second_order_by_input
+    parameter_kernel: ClassVar = second_order_by_parameter
     mass: float = Field(default=1.0, gt=0.0, description="m [unit of the row per unit of xddot]")
     damping: float = Field(default=0.0, description="c [unit of the row per unit of xdot]")
     stiffness: float = Field(default=0.0, description="k [unit of the row per unit of x]")

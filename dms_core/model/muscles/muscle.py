@@ -204,11 +204,27 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jq[m + 1, m + 2] = -rate_u * by_reflex
 
 
+@compiled
+def thelen_muscle_by_input(ip, par, q, v, a, u, Ju):
+    """The activation's row by the excitation; without activation dynamics the fibre's row by the activation."""
+    m = ip[1]
+    act, by_input = muscle_activation(ip, q, u)
+    if ip[0] == 0:
+        by_activation = fibre_state(par, q[m], v[m], act)[4]
+        Ju[m, 0, 0] = by_activation * pennation_cosine(par, q[m])[0] * by_input
+        return
+    wanted = u[0, 0] + par[MUSCLE.reflex_gain] * q[m + 2] if ip[0] > 1 else u[0, 0]
+    excitation, inside = limited(wanted)
+    tau_act, tau_deact = par[MUSCLE.activation_time], par[MUSCLE.deactivation_time]
+    Ju[m + 1, 0, 0] = -activation_rate(act, excitation, tau_act, tau_deact)[2] * inside
+
+
 class ThelenMuscle(Force):
     """One muscle. It owns "fibre_length" and, with activation dynamics, "activation"."""
 
     kind: ClassVar[str] = "thelen_muscle"
     kernel: ClassVar = thelen_muscle
+    input_kernel: ClassVar = thelen_muscle_by_input
     path: tuple[PathPoint, ...] = Field(min_length=2, description="attachment and via points from origin to insertion")
     excitation: str = Field(
         description="name of the input: excitation [-], or the activation itself; limited to 0.01..1"
