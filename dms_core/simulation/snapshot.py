@@ -65,7 +65,9 @@ def held_arrays(state: State) -> Iterator[np.ndarray]:
     """Every array of a world that its future may depend on."""
     yield from (getattr(state.w, name) for name in GLOBAL_WORK)
     yield from (state.signals.t, state.signals.c)
-    yield from (x for x in state if isinstance(x, np.ndarray))
+    yield state.counts
+    # Whole numbers elsewhere are addresses of machine code, which belong to a process.
+    yield from (x for x in state if isinstance(x, np.ndarray) and x.dtype == np.float64)
 
 
 def _digest(*parts: Any) -> str:
