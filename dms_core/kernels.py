@@ -11,6 +11,9 @@ Compiled code takes views of their fields by name and calls, without touching a 
 
 with o an `Options` (`SolverOptions.numbers()`). A function of one packed table can be called by its address: `address`
 gives it, `call_with_table` calls it, and one compiled loop serves every function that exists or is written later.
+
+A first run compiles in two processes: `compile_beside_models("module:function")`, called when a package is imported,
+names a function without arguments that compiles what the package builds on a world.
 """
 
 from dms_core.assembly.sensing import read_sensors
@@ -28,9 +31,10 @@ from dms_core.compiled.arena import (
     number,
     table_at,
 )
-from dms_core.compiled.calls import TABLE_CALL, address, call_with_table
+from dms_core.compiled.calls import TABLE, TABLE_CALL, address, call_with_table
 from dms_core.compiled.compilation import drop_stale_code
 from dms_core.compiled.jit import compiled
+from dms_core.compiled.side_by_side import register as compile_beside_models
 from dms_core.simulation.newton import largest_errors
 from dms_core.simulation.parts import PARTS, advance, restart, run_part
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, rewind
@@ -49,6 +53,7 @@ __all__ = [
     "OUTCOME",
     "SIGNALS",
     "STATE",
+    "TABLE",
     "TABLE_CALL",
     "Options",
     "Packed",
@@ -56,6 +61,7 @@ __all__ = [
     "address",
     "advance",
     "call_with_table",
+    "compile_beside_models",
     "compiled",
     "constraint_gap",
     "drop_stale_code",

@@ -74,7 +74,7 @@ def _constraint_at_rates(x, calls, e, w, m, n, rates):
     call_entry(x.kernel[e], calls, e, w, 0)
 
 
-@compiled
+@compiled(makes_arrays=True)
 def constraint_by_input(calls, e, w, by_value, rate_by_value):
     """s_u and (s_u udot)_u of constraint call e at the state in w, shapes (m, k); the outputs are written over."""
     x = views(calls, w)

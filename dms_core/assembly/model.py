@@ -11,11 +11,13 @@ from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.layout import Layout, same_structure
 from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
+from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
-from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs
+from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
 from dms_core.assembly.sensing import Partials, composition, measure, new_sensing
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
+from dms_core.compiled import side_by_side
 from dms_core.compiled.arena import Packed
 from dms_core.compiled.compilation import announce
 from dms_core.compiled.entries import all_calls, moving_calls
@@ -55,6 +57,7 @@ class Model:
     def __init__(self, system: System, like: Model | None = None) -> None:
         announce()
         self.system = system
+        side_by_side.begin([ORDER_CODE, *side_by_side.registered()], evaluate_rates)
         self.layout = layout = Layout(system)
         _warn_of_unread_inputs(layout)
         self.n_q, self.n_phi = layout.n_q, layout.n_phi
@@ -145,6 +148,7 @@ class Model:
     def _order(self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) -> Tables:
         """Tables with scatter and elimination orders of both linear systems chosen at q, v."""
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
+        side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
         systems = ordered_systems(Sampling(layout, dynamics, constraints, self._signals, free, solved), q, v, t)

@@ -88,7 +88,7 @@ def _evaluation() -> np.ndarray:
     return np.array([address(_evaluate_all, TABLE_CALL)], np.int64)
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _sources(composed, e):
     """Dynamic calls that sensor e sums."""
     ptr = ints(composed, COMPOSITION.source_ptr)

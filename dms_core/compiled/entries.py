@@ -42,14 +42,14 @@ class Slopes(NamedTuple):
 SLOPES = fields(Slopes)
 
 
-@compiled
+@compiled(makes_arrays=True)
 def integers_of(calls, e):
     """Integers of call e."""
     ptr = ints(calls, CALLS.ip_ptr)
     return indices(calls, CALLS.ip)[ptr[e] : ptr[e + 1]]
 
 
-@compiled
+@compiled(makes_arrays=True)
 def numbers_of(calls, e):
     """Numbers of call e."""
     ptr = ints(calls, CALLS.par_ptr)
@@ -118,8 +118,8 @@ def entry(kernel: Any, signature: Any) -> Any:
     code = form.__code__.replace(
         co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
     )
-    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
     options = {k: v for k, v in kernel.targetoptions.items() if k not in ("nopython", "cache")}
+    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": options.get("_nrt", True)}
     within = njit(function, locals=kernel.locals, **{**options, **habits, "forceinline": True})
     known = {**form.__globals__, "_kernel": within}
     found = FunctionType(code, known, name)

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from dms_core.compiled import side_by_side
 from dms_core.compiled.calls import PART, address
 from dms_core.simulation import evaluation, implicit_stage, initial_rates, step_control
 from dms_core.simulation.parts import ADVANCE, PARTS, RATES, RESTART, STAGE, Parts
@@ -13,7 +14,10 @@ from dms_core.simulation.parts import ADVANCE, PARTS, RATES, RESTART, STAGE, Par
 
 @cache
 def part_addresses() -> np.ndarray:
-    """Addresses in the order of `parts.Parts`, shape (len(PARTS),); constant, shared by all worlds."""
+    """Addresses in the order of `parts.Parts`, shape (len(PARTS),); constant, shared by all worlds.
+
+    What builds on them is compiled by a second process at the same time, if it is registered there.
+    """
     found = Parts(
         **{name: address(getattr(evaluation, name), PART) for name in Parts._fields[: PARTS.solve_stage]},
         solve_stage=address(implicit_stage.solve_stage, STAGE),
@@ -23,4 +27,6 @@ def part_addresses() -> np.ndarray:
         restart=address(step_control.restart_method, RESTART),
         advance=address(step_control.advance_method, ADVANCE),
     )
+    for work in side_by_side.registered():
+        side_by_side.wait_for(work)
     return np.array(found, np.int64)

@@ -230,7 +230,8 @@ def newton(m, s, o, c0, close):
             return NEWTON.converged, k + 1
         if k >= 3 and not fresh and contraction > SLOW:
             return NEWTON.stale_matrix, k
-        x_before[:] = x
+        for i in range(x.shape[0]):
+            x_before[i] = x[i]
         before = norm
         rest = norm * contraction ** (MAX_ITERATIONS - 1 - k) / (1.0 - contraction)
         if k > 0 and fresh and rest > o.newton_tol:

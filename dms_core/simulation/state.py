@@ -181,8 +181,12 @@ def rewind(s, q, v, step):
     floats(w, WORK.lam)[:], floats(w, WORK.mu)[:] = 0.0, 0.0
     counts[COUNTS.restart], counts[COUNTS.stale] = 1, 1
     largest[LARGEST.h_least], clock[CLOCK.h_wanted] = math.inf, step
-    floats(s, STATE.q)[:], floats(s, STATE.q_before)[:], floats(w, WORK.q)[:n] = q, q, q
-    floats(s, STATE.v)[:], floats(s, STATE.qd)[:], floats(s, STATE.v_before)[:], floats(w, WORK.v)[:n] = v, v, v, v
+    q_s, q_before, q_w = floats(s, STATE.q), floats(s, STATE.q_before), floats(w, WORK.q)
+    v_s, qd, v_before, v_w = floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.v_before), floats(w, WORK.v)
+    # A loop: numba compiles the copy of an array to an array with all that it takes if they overlap.
+    for i in range(n):
+        q_s[i] = q_before[i] = q_w[i] = q[i]
+        v_s[i] = qd[i] = v_before[i] = v_w[i] = v[i]
 
 
 def with_tables(tables: Tables, state: State) -> Packed:

@@ -13,6 +13,7 @@ import numpy as np
 from dms_core import Model, SolverOptions
 from dms_core.compiled.arena import Packed
 from dms_core.errors import SimulationError
+from dms_core.kernels import compile_beside_models
 from dms_core.results import Result
 from dms_core.simulation.dynamics import World
 from exo_env.drives.drive import COMMANDS, Drive
@@ -29,6 +30,7 @@ from exo_env.tasks.observer import Observer
 from exo_env.tasks.rewards import Weights
 from exo_env.world.control_period import READING, Plant
 from exo_env.world.episode import Episode
+from exo_env.world.episode_code import EPISODE_CODE
 from exo_env.world.reset import (
     FOUND,
     GAPING,
@@ -43,6 +45,8 @@ from exo_env.world.reset import (
 )
 from exo_env.world.scaling import TEMPLATE_ANGLE, declared, fitting, template
 from exo_env.world.tables import plant_of
+
+compile_beside_models(EPISODE_CODE)
 
 PLANNING = 0.05
 """Interval of the motor command's table [s]; a tenth of it would change an activation by 0.002."""

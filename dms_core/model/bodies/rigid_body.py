@@ -94,7 +94,7 @@ def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jv[3 + i, 3 + k] += 8.0 * (dv1[i] + dv2[i])
 
 
-@compiled
+@compiled(makes_arrays=True)
 def rigid_body_by_parameter(ip, par, q, v, a, u, Jp):
     """The rows by mass and inertia, in which they are linear: those of each number 1 with all others 0."""
     for k in range(7):

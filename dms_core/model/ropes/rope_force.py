@@ -42,7 +42,7 @@ def rope_force(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         r[k] *= tau
 
 
-@compiled
+@compiled(makes_arrays=True)
 def rope_force_by_input(ip, par, q, v, a, u, Ju):
     """The rows of the bodies by the tension: l_q^T where the input pulls."""
     if u[0, 0] > 0.0:
