@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import tyro
 from tqdm import tqdm
 
-from dms_core.errors import DmsError, InputError
+from dms_core.errors import DmsError, InputError, ModelWarning
 
 USER_MISTAKE, FAILED_RUN = 2, 1
 """Exit statuses."""
@@ -39,7 +41,8 @@ def run_command(
     """Run one of the commands; a mistake of the user is one message on stderr and status 2."""
     try:
         _check_options(sys.argv[1:] if arguments is None else arguments)
-        status = tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=description, args=arguments)
+        with _sentences_of_warnings():
+            status = tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=description, args=arguments)
         sys.stdout.flush()
         return status
     except DmsError as error:
@@ -49,6 +52,24 @@ def run_command(
         # The reader (head, less) has seen enough; what is left to flush at exit must not complain either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+@contextlib.contextmanager
+def _sentences_of_warnings() -> Iterator[None]:
+    """Within, a ModelWarning is one sentence on stderr, without a line of Python."""
+    usual = warnings.showwarning
+
+    def show(
+        message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
+    ) -> None:
+        if issubclass(category, ModelWarning):
+            print(f"warning: {message}", file=sys.stderr)
+        else:
+            usual(message, category, filename, lineno, file, line)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
 
 
 def _check_options(arguments: list[str]) -> None:

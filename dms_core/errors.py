@@ -6,7 +6,15 @@ class DmsError(Exception):
 
 
 class ModelError(DmsError, ValueError):
-    """A declaration is wrong in itself or does not fit the others."""
+    """A declaration is wrong in itself or does not fit the others.
+
+    Attributes:
+        element: name of the element whose declaration it is, "" where it is not known.
+    """
+
+    def __init__(self, message: str, element: str = "") -> None:
+        super().__init__(message)
+        self.element = element
 
 
 class AssemblyError(DmsError, ValueError):
@@ -19,6 +27,10 @@ class InputError(DmsError, ValueError):
 
 class SimulationError(DmsError, RuntimeError):
     """A run failed and the caller asked for an exception instead of a result code."""
+
+
+class ModelWarning(UserWarning):
+    """A model that can be run, but is hardly what its author meant."""
 
 
 def choices(names) -> str:

@@ -18,6 +18,7 @@ import yaml
 from pydantic import BaseModel
 
 import dms_core.model  # noqa: F401  (makes every kind known)
+from dms_core.assembly.layout import Layout
 from dms_core.errors import DmsError, InputError, ModelError, choices
 from dms_core.model.constraints.euler_norm import EulerNorm
 from dms_core.model.element import Body, Constraint, Declaration, Force, Sensor
@@ -73,20 +74,33 @@ def load(path: str | Path) -> System:
     name = content.get("name", Path(path).stem)
     if not isinstance(name, str):
         raise ModelError(f"{path}: name = {name!r}: a text is wanted.")
-    sections = {section: _section(path, section, content.get(section)) for section in BRANCHES}
+    items = {section: _section(path, section, content.get(section)) for section in BRANCHES}
+    lines = {declared.name: line for found in items.values() for declared, line in found}
     try:
-        return System(name, **sections)  # type: ignore[arg-type]
+        system = System(name, **{section: [e for e, _ in found] for section, found in items.items()})  # type: ignore[arg-type]
     except DmsError as error:
         raise ModelError(f"{path}: {error}") from None
+    _check_names(path, system, lines)
+    return system
 
 
-def _section(path: str | Path, section: str, items: Any) -> list[Declaration]:
-    """The declarations of one section."""
+def _check_names(path: str | Path, system: System, lines: dict[str, int]) -> None:
+    """Bodies, joints, coordinates and inputs that an element names in vain are an error with the element's line."""
+    try:
+        Layout(system)
+    except ModelError as error:
+        # What concerns no single element (a system without bodies) is said when the model is compiled.
+        if error.element in lines:
+            raise ModelError(f"{path}, line {lines[error.element]}: {error}", error.element) from None
+
+
+def _section(path: str | Path, section: str, items: Any) -> list[tuple[Declaration, int]]:
+    """The declarations of one section, each with its line."""
     if items is None:
         return []
     if not isinstance(items, list):
         raise ModelError(f"{path}: {section} = {items!r}: a list is wanted, each item beginning with '- '.")
-    return [_declaration(path, section, item) for item in items]
+    return [(_declaration(path, section, item), getattr(item, "line", 0)) for item in items]
 
 
 def _declaration(path: str | Path, section: str, item: Any) -> Declaration:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from dms_core.assembly.model import Model
+from dms_core.assembly.tables import Signals
 from dms_core.errors import DmsError, SimulationError, choices
-
-if TYPE_CHECKING:
-    from dms_core.assembly.model import Model
-    from dms_core.assembly.tables import Signals
 
 
 class Result(Enum):

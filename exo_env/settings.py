@@ -6,24 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
 from dms_core.config_files import config_file
 from dms_core.errors import InputError
-from dms_core.model.element import explain
+from dms_core.validation import Checked
 from dms_core.yaml_text import read_yaml
 
 
-class Settings(BaseModel):
+class Settings(Checked):
     """Base of all settings: frozen, and checked when they are made."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    def __init__(self, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise InputError(explain(type(self), data, error)) from None
 
     def __hash__(self) -> int:
         """Hash of the class and of all values, which may be mappings too."""

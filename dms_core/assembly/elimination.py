@@ -21,7 +21,6 @@ from dms_core.assembly.sensing import SENSING, put_state
 from dms_core.assembly.tables import WORK
 from dms_core.compiled.arena import fields, floats, indices, inner, matrix
 from dms_core.compiled.jit import compiled
-from dms_core.model.constraints.fixed import Fixed
 from dms_core.model.element import GROUND
 
 
@@ -33,11 +32,11 @@ class Welds(NamedTuple):
     solved: np.ndarray
     """Independent constraint rows that are solved for."""
     coordinates: np.ndarray
-    """Of welded bodies."""
+    """Coordinates of welded bodies."""
     rows: np.ndarray
     """Independent rows among welded bodies and the ground, as many as `coordinates`."""
     inverse: np.ndarray
-    """Of (phi_q^T) of these rows and coordinates."""
+    """Inverse of phi_q^T restricted to these rows and coordinates."""
 
 
 WELDS = fields(Welds)
@@ -47,7 +46,7 @@ def find_welds(layout: Layout, active: np.ndarray, G: np.ndarray) -> Welds:
     """Bodies that are fixed to the ground; none where joints do not hold them exactly once, or where all are fixed.
 
     Args:
-        layout: of the system.
+        layout: the system, laid out.
         active: independent constraint rows.
         G: phi_q at the start, shape (n_phi, n_q).
     """
@@ -73,14 +72,14 @@ def find_welds(layout: Layout, active: np.ndarray, G: np.ndarray) -> Welds:
 
 
 def _fixed_bodies(layout: Layout) -> set[str]:
-    """Rigid bodies that a chain of fixed joints joins to the ground."""
-    joints = [(c.element.body_i, c.element.body_j) for c in layout.constraints if isinstance(c.element, Fixed)]
+    """Bodies that a chain of welds joins to the ground."""
+    welds = [set(c.welded()) for c in layout.system.constraints]
     found, size = {GROUND}, 0
     while len(found) > size:
         size = len(found)
-        for i, j in joints:
-            if i in found or j in found:
-                found |= {i, j}
+        for bodies in welds:
+            if bodies & found:
+                found |= bodies
     return found - {GROUND}
 
 

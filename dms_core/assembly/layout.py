@@ -6,7 +6,9 @@ ground reads and writes like any other; what it writes to the ground's rows fall
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -75,6 +77,19 @@ class Layout:
             self.sensors.append(self._call(sensor, _placed(sensor, system)[0], len(self.outputs), len(parts)))
             self.outputs += [(f"{sensor.name}.{part}" if part else sensor.name, unit) for part, unit in parts]
 
+    @cached_property
+    def digest(self) -> str:
+        """Equal where `same_structure` holds, in this process or another; classes are known by their names."""
+        calls = [*self.dynamics, *self.constraints, *self.sensors]
+        parts = [
+            (f"{type(c.element).__module__}.{type(c.element).__qualname__}", c.iq.tolist(), c.iu.tolist(),
+             list(c.placement.integers))
+            for c in calls
+        ]  # fmt: skip
+        counts = [len(x) for x in (self.dynamics, self.constraints, self.sensors)]
+        everything = (self.names, self.row_names, self.outputs, sorted(self.input_index.items()), counts, parts)
+        return hashlib.sha256(repr(everything).encode()).hexdigest()
+
     def body_indices(self, name: str) -> np.ndarray:
         """Global indices of a body's seven local coordinates."""
         ground = self.n_q + np.arange(7)
@@ -86,16 +101,25 @@ class Layout:
 
     def _call(self, element, placement: Placement, row: int = 0, rows: int = 0) -> Call:
         who = f"{element.kind} '{element.name}'"
+        twice = {b for b in placement.bodies if placement.bodies.count(b) > 1}
+        if twice and not isinstance(element, Sensor):
+            raise ModelError(f"{who}: Expected two different bodies, got '{twice.pop()}' twice.", element.name)
         iq = [self.body_indices(b) for b in placement.bodies]
-        iq.append(np.array([self._find(c, self.index, "coordinate", who) for c in placement.coordinates], int))
-        iu = np.array([self._find(u, self.input_index, "input", who) for u in placement.inputs], int)
+        iq.append(np.array([self._index(element, "coordinate", c, self.index) for c in placement.coordinates], int))
+        iu = np.array([self._index(element, "input", u, self.input_index) for u in placement.inputs], int)
         return Call(element, placement, np.concatenate(iq).astype(np.int32), iu.astype(np.int32), row, rows)
 
     @staticmethod
-    def _find(name: str, table: dict[str, int], what: str, who: str) -> int:
+    def _index(element, what: str, name: str, table: dict[str, int]) -> int:
         if name not in table:
-            raise ModelError(f"{who}: {what} '{name}' does not exist. Declared: {choices(table)}.")
+            who = f"{element.kind} '{element.name}'"
+            raise ModelError(f"{who}: {what} '{name}' does not exist. Declared: {choices(table)}.", element.name)
         return table[name]
+
+    def unread_inputs(self) -> list[str]:
+        """Names of the inputs that no element reads."""
+        read = {k for call in (*self.dynamics, *self.constraints, *self.sensors) for k in call.iu}
+        return [name for name, k in self.input_index.items() if k not in read]
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
         """Declared q and v with the ground behind them, each of shape (n_q + 7,)."""
@@ -118,7 +142,7 @@ def _placed(element: DynamicElement | Constraint | Sensor, system: System) -> tu
         return element.placements(system) if isinstance(element, DynamicElement) else (element.place(system),)
     except ModelError as error:
         who = f"{element.kind} '{element.name}'"
-        raise ModelError(str(error) if who in str(error) else f"{who}: {error}") from None
+        raise ModelError(str(error) if who in str(error) else f"{who}: {error}", element.name) from None
 
 
 def same_structure(one: Layout, other: Layout) -> bool:

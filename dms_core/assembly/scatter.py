@@ -3,12 +3,12 @@
 Indices are read as unsigned: that spares the loops numba's test for negative ones.
 """
 
-from dms_core.assembly.sparsity import NewtonPattern, Part, RatePattern
+from dms_core.assembly.sparsity import BlockPattern, NewtonPattern, Part, RatePattern
 from dms_core.assembly.tables import WORK
 from dms_core.compiled.arena import fields, indices, inner, ints, matrix, naturals
 from dms_core.compiled.jit import compiled
 
-PART, NEWTON, RATES = fields(Part), fields(NewtonPattern), fields(RatePattern)
+PART, NEWTON, RATES, BLOCKS = fields(Part), fields(NewtonPattern), fields(RatePattern), fields(BlockPattern)
 
 
 @compiled
@@ -62,3 +62,25 @@ def scatter_constraint_rates(pattern, e, w, values):
     G = matrix(w, WORK.G)
     _scatter(inner(pattern, RATES.G_lam), e, G, 1.0, values)
     _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
+
+
+@compiled
+def scatter_dynamic_blocks(pattern, e, w, by_q, by_v, by_a):
+    """The local derivatives of dynamic call e into r2_q, r2_v, r2_a."""
+    _scatter(inner(pattern, BLOCKS.Jq), e, matrix(w, WORK.Jq), 1.0, by_q)
+    _scatter(inner(pattern, BLOCKS.Jv), e, matrix(w, WORK.Jv), 1.0, by_v)
+    _scatter(inner(pattern, BLOCKS.Ja), e, matrix(w, WORK.Ja), 1.0, by_a)
+
+
+@compiled
+def scatter_constraint_blocks(pattern, e, w, by_q, G, W):
+    """The local derivatives of constraint call e into r2_q, phi_q, (phi_q v)_q."""
+    _scatter(inner(pattern, BLOCKS.H), e, matrix(w, WORK.H), 1.0, by_q)
+    _scatter(inner(pattern, BLOCKS.G), e, matrix(w, WORK.G), 1.0, G)
+    _scatter(inner(pattern, BLOCKS.W), e, matrix(w, WORK.W), 1.0, W)
+
+
+@compiled
+def scatter_projection_block(pattern, e, w, by_q):
+    """H of constraint call e, evaluated with mu in place of lam, into (phi_q^T mu)_q."""
+    _scatter(inner(pattern, BLOCKS.H_mu), e, matrix(w, WORK.H), 1.0, by_q)

@@ -61,6 +61,20 @@ class RatePattern(NamedTuple):
     G_v: Part
 
 
+class BlockPattern(NamedTuple):
+    """Scatter of each derivative of the residual into a matrix of its own, over all coordinates and rows."""
+
+    Jq: Part
+    """Into r2_q, with H."""
+    Jv: Part
+    Ja: Part
+    H: Part
+    H_mu: Part
+    """Into (phi_q^T mu)_q."""
+    G: Part
+    W: Part
+
+
 class Slots:
     """Collects (row, column) pairs of one matrix and numbers them; pairs outside the matrix share one waste slot."""
 
@@ -155,6 +169,23 @@ def newton_pattern(layout: Layout, free: np.ndarray, solved: np.ndarray) -> tupl
         G_v=_part(slots, ((G, at.row(c, 2 * n + m), q(c, n)) for c, G, W, H in con)),
         W=_part(slots, ((W, at.row(c, 2 * n + m), q(c, 0)) for c, G, W, H in con)),
         H=_part(slots, ((H, q(c, n), q(c, 0)) for c, G, W, H in con)),
+    ), slots
+
+
+def block_pattern(layout: Layout) -> tuple[BlockPattern, dict[str, Slots]]:
+    """Scatter of the derivatives of the residual, and the entries of each matrix by name: q, v, a, mu, G, W."""
+    at = _Index(layout, np.arange(layout.n_q), np.arange(layout.n_phi))
+    slots = {name: Slots() for name in ("q", "v", "a", "mu", "G", "W")}
+    dyn = [(*_dynamic_blocks(c), at.coordinate(c, 0)) for c in layout.dynamics]
+    con = [(*_constraint_blocks(c), at.row(c, 0), at.coordinate(c, 0)) for c in layout.constraints]
+    return BlockPattern(
+        Jq=_part(slots["q"], ((Jq, k, k) for Jq, Jv, Ja, k in dyn)),
+        Jv=_part(slots["v"], ((Jv, k, k) for Jq, Jv, Ja, k in dyn)),
+        Ja=_part(slots["a"], ((Ja, k, k) for Jq, Jv, Ja, k in dyn)),
+        H=_part(slots["q"], ((H, k, k) for G, W, H, row, k in con)),
+        H_mu=_part(slots["mu"], ((H, k, k) for G, W, H, row, k in con)),
+        G=_part(slots["G"], ((G, row, k) for G, W, H, row, k in con)),
+        W=_part(slots["W"], ((W, row, k) for G, W, H, row, k in con)),
     ), slots
 
 

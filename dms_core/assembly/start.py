@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import warnings
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.layout import GROUND_COORDINATES
+from dms_core.assembly.layout import GROUND_COORDINATES, Layout
 from dms_core.assembly.residual import evaluate_inputs
+from dms_core.assembly.tables import Signals, new_work
 from dms_core.compiled.arena import Packed
-from dms_core.errors import AssemblyError
+from dms_core.errors import AssemblyError, ModelWarning
 from dms_core.linear.rank import independent_rows
-from dms_core.model.constraints.fixed import Fixed
-from dms_core.model.constraints.revolute import Revolute
-from dms_core.model.constraints.slider import Slider
+from dms_core.model.element import Constraint
 from dms_core.model.geometry.rotations import rotated
 
-if TYPE_CHECKING:
-    from dms_core.assembly.model import Model
+Jacobian = Callable[..., tuple[np.ndarray, ...]]
+"""(q, v=0, t=0) -> (phi, phi_q v + phi_t, phi_q, (phi_q v)_q), shapes (n_phi,), (n_phi,), (n_phi, n_q) twice."""
 
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-13
 """Positions are assembled to rounding, so that a run does not start with a constraint error."""
 ACCEPTED = 1e-10
 """Constraint error at which a stalled assembly still counts as closed."""
+FAR = 0.02
+"""Distance from its declared start beyond which the way of a body is worth a warning [m]: poses that are rounded to a
+centimetre stay below it, and one that is read off a wrong point, axis or unit is beyond it in mechanisms of the size of
+an arm."""
 VELOCITY_TOLERANCE = 1e-6
 """Relative violation up to which declared velocities are taken as rounded and projected."""
 
@@ -38,36 +43,42 @@ class Start(NamedTuple):
     redundant: np.ndarray
     """Rows that the others imply."""
     singular_values: np.ndarray
-    """Of phi_q at the start, largest first."""
+    """Singular values of phi_q at the start, largest first."""
     moved: float
     """Largest change of a declared coordinate by closing the constraints; states that elements set do not count."""
 
 
-def assemble(model: Model, known: Start | None = None) -> Start:
+def assemble(layout: Layout, signals: Signals, jacobian: Jacobian, known: Start | None = None) -> Start:
     """Bring the declared start onto the constraints.
 
     Args:
-        model: laid out, not yet ordered.
-        known: start of a model of the same structure, whose independent rows are taken over.
+        layout: the system, laid out.
+        signals: its inputs.
+        jacobian: its constraints with their derivatives.
+        known: start of a system of the same structure, whose independent rows are taken over.
 
     Raises:
         AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint;
             the latter is not looked for in what a driver moves at the start.
     """
-    q, v = (x[: model.n_q].copy() for x in model.layout.start())
+    q, v = (x[: layout.n_q].copy() for x in layout.start())
     declared = q.copy()
-    q = _closed(model, q, model.layout.system.name)
-    _check_turns(model, q)
+    q = _closed(layout, jacobian, q, layout.system.name)
+    _check_turns(layout, q)
     moved = float(np.max(np.abs(q - declared)))
-    active, redundant, singular_values = _rows(model, q) if known is None else known[2:5]
-    v = _velocities(model, q, v)
-    _start_states(model, q, v)
+    active, redundant, singular_values = _rows(layout, jacobian, q) if known is None else known[2:5]
+    G = jacobian(q)[2]
+    _warn_of_moved_bodies(layout, declared, q, G)
+    if known is None:
+        _warn_of_drivers(layout, G, len(active))
+    v = _velocities(layout, jacobian, q, v)
+    _start_states(layout, signals, q, v)
     return Start(q, v, active, redundant, singular_values, moved)
 
 
-def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
+def _closed(layout: Layout, jacobian: Jacobian, q: np.ndarray, name: str) -> np.ndarray:
     """Positions on phi = 0: Newton steps of least norm, shortened while |phi| does not fall."""
-    phi, _, G, _ = model.constraint_jacobian(q)
+    phi, _, G, _ = jacobian(q)
     size = np.abs(phi).max(initial=0.0)
     for _ in range(MAX_ITERATIONS):
         if size < TOLERANCE:
@@ -75,14 +86,21 @@ def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
         step = np.linalg.lstsq(G, phi, rcond=1e-10)[0]
         for shorter in 0.5 ** np.arange(8):
             trial = q - shorter * step
-            phi_t, _, G_t, _ = model.constraint_jacobian(trial)
+            phi_t, _, G_t, _ = jacobian(trial)
             if np.abs(phi_t).max() < size:
                 break
         else:
             break
         q, phi, G, size = trial, phi_t, G_t, np.abs(phi_t).max()
     if size > ACCEPTED:
-        row, gap = _widest_gap(model, q)
+        row, gap = _widest_gap(layout, jacobian, q)
+        open_drivers = _driver_rows(layout) & (np.abs(phi) > 0.1 * size)
+        if np.count_nonzero(open_drivers) > 1:
+            raise AssemblyError(
+                f"system '{name}' cannot be assembled: the drivers {_drivers_of(layout, open_drivers)} contradict each "
+                f"other; their inputs at t = 0 leave '{row}' open by {gap:.3g} (m or rad). Remove one, or give them "
+                "inputs that agree."
+            )
         raise AssemblyError(
             f"system '{name}' cannot be assembled: constraint '{row}' stays open by {gap:.3g} (m or -) "
             "after least-squares assembly. Check the lengths of that loop, or declare start poses nearer to the "
@@ -91,82 +109,131 @@ def _closed(model: Model, q: np.ndarray, name: str) -> np.ndarray:
     return q
 
 
-def _check_turns(model: Model, q: np.ndarray) -> None:
+def _warn_of_moved_bodies(layout: Layout, declared: np.ndarray, q: np.ndarray, G: np.ndarray) -> None:
+    """Warns of the body that assembly moved farthest from where it was declared, if that is far.
+
+    Where a driver moves a mechanism its declared start is a guess, and nothing is said.
+    """
+    linked, far = np.any(G[_linked(G, _driver_rows(layout))] != 0.0, axis=0), []
+    for body in layout.system.bodies:
+        k = layout.offset[body.name]
+        if not linked[k : k + len(body.coordinates())].any():
+            far.append((float(np.linalg.norm(q[k : k + 3] - declared[k : k + 3])), body.name))
+    distance, name = max(far, default=(0.0, ""))
+    if distance > FAR:
+        warnings.warn(
+            f"system '{layout.system.name}': closing the joints moved the body '{name}' by {distance:.3g} m from its "
+            "declared start. Compare its position and orientation with the points and axes of its joints.",
+            ModelWarning,
+            stacklevel=4,
+        )
+
+
+def _driver_rows(layout: Layout) -> np.ndarray:
+    """True for the rows of constraints that read an input; shape (n_phi,)."""
+    rows = np.zeros(layout.n_phi, bool)
+    for call in layout.constraints:
+        rows[call.row : call.row + call.rows] = len(call.iu) > 0
+    return rows
+
+
+def _drivers_of(layout: Layout, rows: np.ndarray) -> str:
+    """Names of the constraints that read an input and own one of these rows."""
+    calls = [c for c in layout.constraints if len(c.iu) and rows[c.row : c.row + c.rows].any()]
+    return ", ".join(f"'{c.element.name}'" for c in calls)
+
+
+def _warn_of_drivers(layout: Layout, G: np.ndarray, rank: int) -> None:
+    """Warns of drivers that determine more than the joints leave free, though their inputs agree at the start."""
+    drivers = _driver_rows(layout)
+    if not drivers.any() or rank == layout.n_phi:
+        return
+    others = len(independent_rows(G[~drivers]).independent) if not drivers.all() else 0
+    if rank - others < np.count_nonzero(drivers):
+        warnings.warn(
+            f"system '{layout.system.name}': {_drivers_of(layout, drivers)} drive more than the joints leave free. The "
+            "equations can hold only as long as the inputs agree; a run stops where they do not. Remove a driver.",
+            ModelWarning,
+            stacklevel=4,
+        )
+
+
+def _check_turns(layout: Layout, q: np.ndarray) -> None:
     """Perpendicular directions stay so in a body that is turned over: a joint closed like that is an error."""
     whole = np.concatenate([q, GROUND_COORDINATES])
-    for call in model.layout.constraints:
-        if not isinstance(call.element, Fixed | Slider | Revolute):
-            continue
+    for call in layout.constraints:
+        assert isinstance(call.element, Constraint)
         local = whole[call.iq]
         for a, b in zip(*call.element.aligned(call.placement.numbers), strict=True):
             if np.dot(rotated(local, 0, tuple(a)), rotated(local, 7, tuple(b))) < 0.0:
+                turned = call.placement.bodies[1]
                 raise AssemblyError(
-                    f"{call.element.kind} '{call.element.name}' can be assembled only with '{call.element.body_j}' "
+                    f"{call.element.kind} '{call.element.name}' can be assembled only with '{turned}' "
                     "turned over by half a turn; declare its start orientation nearer to that of the joint, or reverse "
                     "the direction that the joint has in it."
                 )
 
 
-def _widest_gap(model: Model, q: np.ndarray) -> tuple[str, float]:
+def _widest_gap(layout: Layout, jacobian: Jacobian, q: np.ndarray) -> tuple[str, float]:
     """Constraint row that is open most, and by how much, with every body whole again: least squares stretches them."""
     q = q.copy()
-    for body in model.system.bodies:
+    for body in layout.system.bodies:
         if body.rigid:
-            p = q[model.layout.offset[body.name] + 3 :][:4]
+            p = q[layout.offset[body.name] + 3 :][:4]
             p /= np.linalg.norm(p)
-    phi = np.abs(model.constraint_jacobian(q)[0])
+    phi = np.abs(jacobian(q)[0])
     row = int(np.argmax(phi))
-    return model.layout.row_names[row], float(phi[row])
+    return layout.row_names[row], float(phi[row])
 
 
-def _rows(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _rows(layout: Layout, jacobian: Jacobian, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Independent and redundant rows of phi_q; a row counts as redundant only if it is so in a second position too."""
-    if model.n_phi == 0:
+    if layout.n_phi == 0:
         none = np.zeros(0, int)
         return none, none, np.zeros(0)
-    G = model.constraint_jacobian(q)[2]
+    G = jacobian(q)[2]
     active, redundant, singular_values, _ = independent_rows(G)
     if len(redundant) == 0:
         return active, redundant, singular_values
-    freedom = np.random.default_rng(0).normal(size=model.n_q)
+    freedom = np.random.default_rng(0).normal(size=layout.n_q)
     freedom -= np.linalg.lstsq(G, G @ freedom, rcond=1e-10)[0]
     if np.linalg.norm(freedom) > 1e-9:
         try:
-            near = _closed(model, q + 1e-2 * freedom / np.linalg.norm(freedom), "near the start")
+            near = _closed(layout, jacobian, q + 1e-2 * freedom / np.linalg.norm(freedom), "near the start")
         except AssemblyError:
             return active, redundant, singular_values
-        other = independent_rows(model.constraint_jacobian(near)[2])
+        other = independent_rows(jacobian(near)[2])
         if len(other[0]) > len(active):
             active, redundant = other[:2]
     return active, redundant, singular_values
 
 
-def _velocities(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _velocities(layout: Layout, jacobian: Jacobian, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Velocities on phi_q v + phi_t = 0.
 
     A contradiction of declared ones is an error; in a mechanism that a driver moves they are a guess, and the nearest
     are taken.
     """
-    _, phi_v, G, _ = model.constraint_jacobian(q, v)
-    _, phi_t, _, _ = model.constraint_jacobian(q, np.zeros_like(v))
-    correction = np.linalg.lstsq(G, phi_v, rcond=1e-10)[0] if model.n_phi else np.zeros_like(v)
+    _, phi_v, G, _ = jacobian(q, v)
+    _, phi_t, _, _ = jacobian(q, np.zeros_like(v))
+    correction = np.linalg.lstsq(G, phi_v, rcond=1e-10)[0] if layout.n_phi else np.zeros_like(v)
     size = np.abs(v).max(initial=0.0)
-    driven = _driven(G, phi_t)
+    driven = _linked(G, phi_t != 0.0)
     gap = np.where(driven, 0.0, np.abs(phi_v))
     if size > 0.0 and gap.max(initial=0.0) > VELOCITY_TOLERANCE * size:
         row = int(np.argmax(gap))
         worst = int(np.argmax(np.abs(correction) * np.any(G[~driven] != 0.0, axis=0)))
         raise AssemblyError(
-            f"the declared velocities are inconsistent: constraint '{model.layout.row_names[row]}' would open at "
-            f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{model.layout.names[worst]}' "
+            f"the declared velocities are inconsistent: constraint '{layout.row_names[row]}' would open at "
+            f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{layout.names[worst]}' "
             f"from {v[worst]:.6g} to {v[worst] - correction[worst]:.6g}; declare all velocities of that loop."
         )
     return v - correction
 
 
-def _driven(G: np.ndarray, phi_t: np.ndarray) -> np.ndarray:
-    """True for the rows of a mechanism, coordinates that constraints link, in which a driver moves; shape (m,)."""
-    touches, rows = G != 0.0, phi_t != 0.0
+def _linked(G: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """True for all rows of the mechanisms, coordinates that constraints link, to which these belong; shape (m,)."""
+    touches = G != 0.0
     while True:
         more = np.any(touches[:, np.any(touches[rows], axis=0)], axis=1) | rows
         if np.array_equal(more, rows):
@@ -174,17 +241,17 @@ def _driven(G: np.ndarray, phi_t: np.ndarray) -> np.ndarray:
         rows = more
 
 
-def _start_states(model: Model, q: np.ndarray, v: np.ndarray) -> None:
+def _start_states(layout: Layout, signals: Signals, q: np.ndarray, v: np.ndarray) -> None:
     """Let elements set their own coordinates from the assembled positions (fibres in equilibrium, PID states)."""
-    w = model.new_work()
-    signals, packed = Packed(model._signals), Packed(w)
-    evaluate_inputs(signals.table, 0.0, False, packed.table)
-    w.q[: model.n_q], w.v[: model.n_q] = q, v
-    for call in model.layout.dynamics:
+    w = new_work(layout)
+    packed = Packed(w)
+    evaluate_inputs(Packed(signals).table, 0.0, False, packed.table)
+    w.q[: layout.n_q], w.v[: layout.n_q] = q, v
+    for call in layout.dynamics:
         hook = getattr(call.element, "start_states", None)
         if hook is None:
             continue
-        own = model.layout.offset[call.element.name]
-        for k, (value, rate) in enumerate(hook(model.layout.system, w.q[call.iq], w.u[call.iu])):
+        own = layout.offset[call.element.name]
+        for k, (value, rate) in enumerate(hook(layout.system, w.q[call.iq], w.u[call.iu])):
             q[own + k], v[own + k] = value, rate
             w.q[own + k], w.v[own + k] = value, rate

@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dms_core.assembly.layout import Layout
+from dms_core.assembly.sparsity import NewtonPattern, RatePattern
 from dms_core.compiled.arena import fields
 from dms_core.compiled.calls import SIGNAL, address
 from dms_core.errors import InputError
+from dms_core.linear.symbolic import LuTables
 from dms_core.model.signals import Function, Harmonic
 
 POLYNOMIAL, HARMONIC, FUNCTION = 0, 1, 2
@@ -92,7 +94,29 @@ class Work(NamedTuple):
     Yu: np.ndarray
 
 
-CALLS, SIGNALS, WORK = fields(Calls), fields(Signals), fields(Work)
+class Tables(NamedTuple):
+    """Constants of a compiled model."""
+
+    dynamics: Calls
+    constraints: Calls
+    sensors: Calls
+    newton: NewtonPattern
+    newton_lu: LuTables
+    rates: RatePattern
+    rate_lu: LuTables
+    free: np.ndarray
+    """Coordinates that are solved for: all but those of welded bodies, (n_free,)."""
+    active: np.ndarray
+    """Constraint rows that are solved for, (n_active,)."""
+    second: np.ndarray
+    """True for second-order coordinates, whose vdot appears in their row, (n_q,)."""
+    scale_q: np.ndarray
+    scale_v: np.ndarray
+    driven: int
+    """Constraints that read an input: a jump of it opens rows of accelerations."""
+
+
+CALLS, SIGNALS, WORK, MODEL = fields(Calls), fields(Signals), fields(Work), fields(Tables)
 
 
 def flat(parts: list[Any], dtype: Any) -> tuple[np.ndarray, np.ndarray]:

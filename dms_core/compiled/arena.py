@@ -74,49 +74,49 @@ _uint32 = _pointer_to(types.uint32)
 _bool = _pointer_to(types.boolean)
 
 
-@compiled
+@compiled(makes_arrays=True)
 def table_at(address, rows):
     """The packed table with that address and number of fields."""
     return carray(_int64(address), (rows, 3))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def floats(table, k):
     """Field k as a vector of floats."""
     return carray(_float64(table[k, 0]), (table[k, 1],))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def matrix(table, k):
     """Field k as a matrix of floats."""
     return carray(_float64(table[k, 0]), (table[k, 1], table[k, 2]))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def ints(table, k):
     """Field k as a vector of 64-bit integers."""
     return carray(_int64(table[k, 0]), (table[k, 1],))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def indices(table, k):
     """Field k as a vector of 32-bit integers."""
     return carray(_int32(table[k, 0]), (table[k, 1],))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def naturals(table, k):
     """Field k as a vector of unsigned 32-bit integers."""
     return carray(_uint32(table[k, 0]), (table[k, 1],))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def flags(table, k):
     """Field k as a vector of booleans."""
     return carray(_bool(table[k, 0]), (table[k, 1],))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def inner(table, k):
     """Field k as the table of a nested tuple."""
     return carray(_int64(table[k, 0]), (table[k, 1], table[k, 2]))

@@ -13,12 +13,13 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-_TABLE = types.Array(types.int64, 2, "C")
-PART = types.void(_TABLE, _TABLE)
-ENTRY = types.void(_TABLE, types.int64, _TABLE, types.int64)
+TABLE = types.Array(types.int64, 2, "C")
+"""Type of a packed table."""
+PART = types.void(TABLE, TABLE)
+ENTRY = types.void(TABLE, types.int64, TABLE, types.int64)
 SIGNAL = types.void(types.float64, types.Array(types.float64, 1, "C"))
-TABLE_CALL = types.void(_TABLE)
-"""Of a function of one packed table, see `call_with_table`."""
+TABLE_CALL = types.void(TABLE)
+"""Signature of a function of one packed table, see `call_with_table`."""
 
 
 @cache
@@ -32,37 +33,37 @@ def address(function: Any, signature: Any) -> int:
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
 
-def _call_by_address(signature: Any) -> Any:
-    """Code generator of a call with numba's own calling convention to the address in the first argument."""
+def call_by_address(signature: Any) -> Any:
+    """What an intrinsic (address, *arguments) gives back: a call of the code at an address, by numba's convention."""
 
     def codegen(context, builder, sig, args):
-        target = context.call_conv.get_function_type(types.none, signature.args)
+        target = context.call_conv.get_function_type(signature.return_type, signature.args)
         function = builder.inttoptr(args[0], target.as_pointer())
-        context.call_conv.call_function(builder, function, types.none, signature.args, args[1:])
-        return context.get_dummy_value()
+        _, value = context.call_conv.call_function(builder, function, signature.return_type, signature.args, args[1:])
+        return context.get_dummy_value() if signature.return_type == types.none else value
 
-    return types.void(types.int64, *signature.args), codegen
+    return signature.return_type(types.int64, *signature.args), codegen
 
 
 @intrinsic
 def call_entry(typingctx, address, calls, e, w, level):
     """Call the entry of a kernel."""
-    return _call_by_address(ENTRY)
+    return call_by_address(ENTRY)
 
 
 @intrinsic
 def call_signal(typingctx, address, t, out):
     """Call a compiled function of time."""
-    return _call_by_address(SIGNAL)
+    return call_by_address(SIGNAL)
 
 
 @intrinsic
 def call_part(typingctx, address, m, s):
     """Call a part of a step."""
-    return _call_by_address(PART)
+    return call_by_address(PART)
 
 
 @intrinsic
 def call_with_table(typingctx, address, table):
     """Call a compiled function of one packed table; it gives nothing back."""
-    return _call_by_address(TABLE_CALL)
+    return call_by_address(TABLE_CALL)

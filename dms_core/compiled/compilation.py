@@ -13,6 +13,7 @@ import math
 import sys
 import time
 from pathlib import Path
+from typing import Any, TextIO
 
 from numba.core import event
 from numba.core.caching import NullCache
@@ -20,9 +21,11 @@ from numba.core.caching import NullCache
 PACKAGE = Path(__file__).parents[1]
 STAMP = "compiled_sources.sha256"
 QUIET = 1.0
-"""Pause after which more compiling is told of again [s]."""
-
-
+"""Pause after which more compiling is announced again [s]."""
+INTERVAL = 10.0
+"""Time between two lines about the progress where there is no terminal whose line could be rewritten [s]."""
+WIDTH = 79
+"""Characters of the line on a terminal."""
 LAYOUT = ("assembly", "compiled")
 """Sources that say where compiled code finds its arrays, whether they hold compiled functions or not."""
 
@@ -51,30 +54,72 @@ def drop_stale_code(package: Path = PACKAGE) -> None:
         stamp.write_text(now)
 
 
-class _Announcer(event.Listener):
-    """Says on stderr that code is being compiled: numba itself tells, so nothing is said from a warm cache.
+_functions = 0
+"""Functions that this process may have to compile, as far as it has imported them."""
 
-    A first reset compiles, and so does the first step behind it: what comes after a while is said again.
+
+def count_function() -> None:
+    """One more function that may have to be compiled."""
+    global _functions
+    _functions += 1
+
+
+class _Announcer(event.Listener):
+    """Shows on stderr what is being compiled and how far it is: numba tells, so nothing is said from a warm cache.
+
+    On a terminal one line is rewritten; elsewhere there is a line at the beginning and one every ten seconds. A first
+    reset compiles, and so does the first step behind it: what comes after a while is announced again.
     """
 
-    def __init__(self) -> None:
-        self._depth, self._ended = 0, -math.inf
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
+        self._depth, self._ended, self._done = 0, -math.inf, 0
+        self._began = self._spoke = 0.0
 
     def on_start(self, event: event.Event) -> None:
         """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""
-        self._depth += _kept(event)
-        if _kept(event) and self._depth == 1 and time.monotonic() - self._ended > QUIET:
-            print(
-                "dms_core: compiling what is new, kept on disk (seconds; about a minute the very first time) ...",
-                file=sys.stderr,
-                flush=True,
-            )
+        if not _kept(event):
+            return
+        self._depth += 1
+        now = time.monotonic()
+        if self._depth == 1 and now - self._ended > QUIET:
+            self._began, self._spoke = now, now
+            self._say("compiling what is new, kept on disk (seconds; about a minute the very first time) ...")
+        self._show(event.data["dispatcher"].py_func, now)
 
     def on_end(self, event: event.Event) -> None:
         """The pause between two stretches of compiling begins where the outermost function is done."""
-        self._depth -= _kept(event)
-        if _kept(event) and self._depth == 0:
+        if not _kept(event):
+            return
+        self._depth -= 1
+        self._done += 1
+        if self._depth == 0:
             self._ended = time.monotonic()
+            if self._stream.isatty():
+                self._stream.write("\r" + " " * WIDTH + "\r")
+                self._stream.flush()
+
+    def wait(self) -> None:
+        """Nothing is compiled here until a second process has done its share."""
+        if self._stream.isatty():
+            self._stream.write("\rdms_core: waiting for code that a second process compiles".ljust(WIDTH))
+            self._stream.flush()
+
+    def _say(self, text: str) -> None:
+        print(f"dms_core: {text}", file=self._stream, flush=True)
+
+    def _show(self, function: Any, now: float) -> None:
+        """The function at work, and how many are done."""
+        # Inner functions of numba's own are compiled on the way.
+        name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+        total = max(_functions, self._done + 1)
+        text = f"{self._done} of at most {total} functions, {now - self._began:.0f} s: {name}"
+        if self._stream.isatty():
+            self._stream.write(f"\rdms_core: {text}"[:WIDTH].ljust(WIDTH))
+            self._stream.flush()
+        elif now - self._spoke > INTERVAL:
+            self._spoke = now
+            self._say(text)
 
 
 def _kept(event: event.Event) -> bool:
@@ -85,8 +130,14 @@ def _kept(event: event.Event) -> bool:
 _announcer: _Announcer | None = None
 
 
+def announce_waiting() -> None:
+    """Say that this process waits for code which a second one compiles."""
+    if _announcer is not None:
+        _announcer.wait()
+
+
 def announce() -> None:
-    """From now on, say on stderr when something has to be compiled, once for each stretch of it."""
+    """From now on, show on stderr what has to be compiled."""
     global _announcer
     if _announcer is None:
         _announcer = _Announcer()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cache
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,25 +16,40 @@ from numba.extending import is_jitted
 
 from dms_core.assembly.layout import Call, Layout
 from dms_core.assembly.tables import CALLS, WORK, Calls, flat
-from dms_core.compiled.arena import floats, indices, ints, matrix
+from dms_core.compiled.arena import fields, floats, indices, ints, matrix
 from dms_core.compiled.calls import ENTRY, address
 from dms_core.compiled.compilation import fingerprint
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.model.element import CONSTRAINT, DYNAMIC, SENSOR
+from dms_core.model.element import CONSTRAINT, DYNAMIC, INPUT_DERIVATIVE, PARAMETER_DERIVATIVE, SENSOR
 
 _kernel: Any = None
 """In the globals of an entry: the kernel that it is for."""
 
 
-@compiled
+class Slopes(NamedTuple):
+    """Local arrays of a kernel that gives derivatives by inputs or by parameters; the first four belong to a Work."""
+
+    q_l: np.ndarray
+    v_l: np.ndarray
+    a_l: np.ndarray
+    u_l: np.ndarray
+    Ju: np.ndarray
+    """(n, 3 k): columns 3 k to 3 k + 2 belong to input k."""
+    Jp: np.ndarray
+
+
+SLOPES = fields(Slopes)
+
+
+@compiled(makes_arrays=True)
 def integers_of(calls, e):
     """Integers of call e."""
     ptr = ints(calls, CALLS.ip_ptr)
     return indices(calls, CALLS.ip)[ptr[e] : ptr[e + 1]]
 
 
-@compiled
+@compiled(makes_arrays=True)
 def numbers_of(calls, e):
     """Numbers of call e."""
     ptr = ints(calls, CALLS.par_ptr)
@@ -64,7 +79,25 @@ def _sensor(calls, e, w, level):  # noqa: ANN001, ANN202
     )  # fmt: skip
 
 
-_ENTRIES = {DYNAMIC: _dynamic, CONSTRAINT: _constraint, SENSOR: _sensor}
+def _by_input(calls, e, w, level):  # noqa: ANN001, ANN202
+    Ju = matrix(w, SLOPES.Ju)
+    _kernel(
+        integers_of(calls, e), numbers_of(calls, e), floats(w, SLOPES.q_l), floats(w, SLOPES.v_l),
+        floats(w, SLOPES.a_l), matrix(w, SLOPES.u_l), Ju.reshape((Ju.shape[0], Ju.shape[1] // 3, 3)),
+    )  # fmt: skip
+
+
+def _by_parameter(calls, e, w, level):  # noqa: ANN001, ANN202
+    _kernel(
+        integers_of(calls, e), numbers_of(calls, e), floats(w, SLOPES.q_l), floats(w, SLOPES.v_l),
+        floats(w, SLOPES.a_l), matrix(w, SLOPES.u_l), matrix(w, SLOPES.Jp),
+    )  # fmt: skip
+
+
+_ENTRIES = {
+    DYNAMIC: _dynamic, CONSTRAINT: _constraint, SENSOR: _sensor, INPUT_DERIVATIVE: _by_input,
+    PARAMETER_DERIVATIVE: _by_parameter,
+}  # fmt: skip
 
 
 @cache
@@ -85,14 +118,42 @@ def entry(kernel: Any, signature: Any) -> Any:
     code = form.__code__.replace(
         co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
     )
-    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
     options = {k: v for k, v in kernel.targetoptions.items() if k not in ("nopython", "cache")}
+    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": options.get("_nrt", True)}
     within = njit(function, locals=kernel.locals, **{**options, **habits, "forceinline": True})
     known = {**form.__globals__, "_kernel": within}
     found = FunctionType(code, known, name)
     found.__module__, found.__qualname__ = function.__module__, name
     kept = kernel.stats.cache_path is not None and function.__closure__ is None
     return njit(found, cache=kept, **habits)
+
+
+def derivative_kernel(element: type, attribute: str) -> Any:
+    """`input_kernel` or `parameter_kernel` of an element's class; None where differences have to do.
+
+    One that was inherited beside a kernel of the subclass's own belongs to another kernel, and does not count.
+    """
+    declared = next(c for c in element.__mro__ if attribute in vars(c))
+    kernel_of = next(c for c in element.__mro__ if "kernel" in vars(c))
+    return vars(declared)[attribute] if issubclass(declared, kernel_of) else None
+
+
+def derivative_addresses(calls: list[Call], attribute: str, signature: Any) -> np.ndarray:
+    """Addresses of the entries of that derivative kernel, compiled or loaded here; 0 where there is none, (n_calls,).
+
+    Raises:
+        ModelError: a derivative kernel is no function compiled by numba.
+    """
+    found = []
+    for call in calls:
+        element, kernel = call.element, derivative_kernel(type(call.element), attribute)
+        if kernel is not None and not is_jitted(kernel):
+            raise ModelError(
+                f"{element.kind} '{element.name}': expected a function decorated with numba.njit as {attribute}, got "
+                f"{kernel!r}."
+            )
+        found.append(0 if kernel is None else address(entry(kernel, signature), ENTRY))
+    return np.array(found, np.int64)
 
 
 def call_tables(calls: list[Call], signature: Any) -> Calls:

@@ -137,7 +137,8 @@ def solve_transposed(tables, a, b, x, work):
 @compiled
 def residual(rows, cols, values, b, x, r):
     """r = b - A x from the entries of A; a check on a factorisation, and the start of a refinement step."""
-    r[:] = b
+    for k in range(b.size):
+        r[k] = b[k]
     for e in range(rows.size):
         r[rows[e]] -= values[e] * x[cols[e]]
 

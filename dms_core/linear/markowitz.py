@@ -34,7 +34,7 @@ class Lines(NamedTuple):
     done: np.ndarray
 
 
-@compiled
+@compiled(makes_arrays=True)
 def equilibrated(n, start, index, data):
     """A copy of data with largest entries near 1 in all lines (Ruiz 2001: each pass halves the digits of spread)."""
     x = np.abs(data)
@@ -51,7 +51,7 @@ def equilibrated(n, start, index, data):
     return np.copysign(x, data)
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _lines(n, start, index, room, by_column):
     """Rows, or columns, of a compressed matrix with room to grow; none is listed yet."""
     length = np.zeros(n, np.int64)
@@ -73,7 +73,7 @@ def _lines(n, start, index, room, by_column):
     )  # fmt: skip
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _enlist(X, line):
     """Puts an open line first in the list of its length."""
     first = X.head[X.length[line]]
@@ -83,7 +83,7 @@ def _enlist(X, line):
     X.head[X.length[line]] = line
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _delist(X, line):
     """Takes an open line out of the list of its length."""
     after, before = X.after[line], X.before[line]
@@ -95,7 +95,7 @@ def _delist(X, line):
         X.before[after] = before
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _open(X, line):
     """Makes a line a candidate, unless its pivot is already taken."""
     if not X.done[line] and not X.listed[line]:
@@ -103,14 +103,14 @@ def _open(X, line):
         _enlist(X, line)
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _close_all(X):
     """No line is a candidate any more."""
     X.head[:] = -1
     X.listed[:] = False
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _make_room(X, values, line, wanted):
     """Lets a line hold `wanted` entries; values has entries only for rows. False when the store is full."""
     if wanted <= X.room[line]:
@@ -127,7 +127,7 @@ def _make_room(X, values, line, wanted):
     return True
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _place_of(X, line, other):
     """Where in the store a line holds `other`."""
     p = X.first[line]
@@ -136,7 +136,7 @@ def _place_of(X, line, other):
     return p
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _search_line(R, C, values, largest, threshold, line, is_column, best, state):
     """Improves best = (cost, key, i, j) by the admissible entries of one line; also whether it had one that counts."""
     cost, key, bi, bj = best
@@ -156,7 +156,7 @@ def _search_line(R, C, values, largest, threshold, line, is_column, best, state)
     return (cost, key, bi, bj), found, state
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _find_pivot(n, R, C, values, largest, threshold, state):
     """The cheapest admissible entry of the shortest open lines: cost, row (-1 when there is none), column, state.
 
@@ -177,7 +177,7 @@ def _find_pivot(n, R, C, values, largest, threshold, state):
     return best[0], best[2], best[3], state
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _take_out(R, C, values, place, pi, pj):
     """Removes the pivot row from the columns, marks where it holds each column, returns the pivot."""
     pivot = 0.0
@@ -196,7 +196,7 @@ def _take_out(R, C, values, place, pi, pj):
     return pivot
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _update_row(R, C, values, largest, place, i, pi, pj, pivot):
     """Row i loses column pj and gains the fill of the pivot row. False when the store is full."""
     if not _make_room(R, values, i, R.length[i] + R.length[pi]):
@@ -226,7 +226,7 @@ def _update_row(R, C, values, largest, place, i, pi, pj, pivot):
     return True
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _eliminate(R, C, values, largest, place, pi, pj):
     """One step of Gauss' elimination on the pivot (pi, pj). False when a store is full."""
     if R.listed[pi]:
@@ -250,7 +250,7 @@ def _eliminate(R, C, values, largest, place, pi, pj):
     return True
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _slide(n, R, C, sweep, window, lowest, opened):
     """Opens the lines up to `window` beyond the first one along the sweep that still waits for its pivots."""
     while lowest < n and R.done[sweep[lowest]] and C.done[sweep[lowest]]:
@@ -262,7 +262,7 @@ def _slide(n, R, C, sweep, window, lowest, opened):
     return lowest, opened
 
 
-@compiled
+@compiled(makes_arrays=True)
 def order(n, start, index, data, sweep, limits, threshold, seed, room):
     """Both permutations and the number of pivots found, or OUT_OF_ROOM; limits = (window, free_cost)."""
     R, C = _lines(n, start, index, room, False), _lines(n, start, index, room, True)

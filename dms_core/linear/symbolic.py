@@ -152,7 +152,7 @@ def _fill(n, rows, cols, row_perm, col_perm) -> Fill:
     return Fill(start, index, diagonal, *_below(n, start, index, diagonal))
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _filled(n, start, index, room):
     """Row i of L + U is row i of the matrix joined with row k of U for every k of its part in L, in ascending order.
 
@@ -194,7 +194,7 @@ def _filled(n, start, index, room):
     return begin, out, diagonal, used
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _below(n, start, index, diagonal):
     """Rows of L by columns: start (n+1,), rows ascending."""
     begin = np.zeros(n + 1, np.int64)
@@ -210,7 +210,7 @@ def _below(n, start, index, diagonal):
     return begin, rows
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _depth_first(n, fill):
     """The steps in an order that respects L and U and takes up at once what a step has made ready."""
     waits = np.zeros(n, np.int64)
@@ -236,7 +236,7 @@ def _depth_first(n, fill):
     return order
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _release(k, waits, stack, top):
     """One less to wait for; a step that waits for nothing goes on the stack."""
     waits[k] -= 1
@@ -246,7 +246,7 @@ def _release(k, waits, stack, top):
     return top
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _groups(n, fill, block_cost, group_cost):
     """Where a new group of at most eight columns starts (bool, (n,)), and the cost of the whole.
 
@@ -305,7 +305,7 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
     )
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _blocks(n, fill, slot):
     """Offsets of each row's first block, pivot's block and end, and the first slot of every block."""
     first, diagonal, end = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
@@ -323,7 +323,7 @@ def _blocks(n, fill, slot):
     return first, diagonal, end, group[:count].copy()
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _targets(n, fill, first, diagonal, end, group, updates):
     """For every step, every row below the pivot and every block of the pivot row: which block is updated."""
     target, count = np.empty(updates, np.int64), 0
@@ -338,7 +338,7 @@ def _targets(n, fill, first, diagonal, end, group, updates):
     return target
 
 
-@compiled
+@compiled(makes_arrays=True)
 def _positions(row_steps, col_steps, slot, first, group):
     """Where each entry of the input is stored."""
     out = np.empty(row_steps.size, np.int32)

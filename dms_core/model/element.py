@@ -27,6 +27,19 @@ Sensor kernel: y = h(q, v, vdot, lam, u)
     kernel(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu)
 
 `ip` and `par` are the integers and numbers of `Placement`; `u[k]` is (value, rate, second derivative) of input k.
+A sensor reads values of inputs only, and Yu[i, k] is the derivative of y[i] by the value of input k.
+
+Derivatives by inputs and parameters are asked for by estimation, sensitivities and linearisation, never by a step. A
+dynamic element may have two more compiled functions for them; outputs are zero before each call:
+
+    input_kernel(ip, par, q, v, a, u, Ju)          Ju[i, k, j]  derivative of r[i] by u[k, j]
+    parameter_kernel(ip, par, q, v, a, u, Jp)      Jp[i, p]     derivative of r[i] by par[p], for every p
+
+They are called only for placements with inputs, and with numbers. Where an element has none, or a subclass has a
+kernel of its own and inherits the other, the kernel is differentiated by central differences, and the result names the
+element (input_derivatives.py, parameter_derivatives.py). Constraints need no such function: what a kernel writes into
+phi_t for given rates of its inputs tells the derivative by them. Derivatives of constraints and sensors by parameters
+are differences.
 
 An element whose own coordinates depend on the assembled position (a fibre in equilibrium, a controller's error) may
 have a method `start_states(system, q, u)` that gives one pair (value, rate) for each coordinate it owns, from the local
@@ -40,9 +53,10 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numba import float64, int32, int64, types
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from dms_core.errors import DmsError, ModelError, choices
+from dms_core.errors import DmsError, ModelError
+from dms_core.validation import Checked
 
 _I = types.Array(int32, 1, "C")
 _A = types.Array(float64, 1, "C")
@@ -51,6 +65,8 @@ _B = types.Array(float64, 2, "C")
 DYNAMIC = types.void(_I, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B)
 CONSTRAINT = types.void(_I, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B, _B)
 SENSOR = types.void(_I, _A, _A, _A, _A, _A, _B, int64, _A, _B, _B, _B, _B, _B)
+INPUT_DERIVATIVE = types.void(_I, _A, _A, _A, _A, _B, types.Array(float64, 3, "C"))
+PARAMETER_DERIVATIVE = types.void(_I, _A, _A, _A, _A, _B, _B)
 
 GROUND = "ground"
 
@@ -73,6 +89,30 @@ class Coordinate(NamedTuple):
     differential_rate: bool = True
     """True when vdot appears in the element's row (a second-order coordinate); False when the row fixes v
     itself (a first-order state: fibre length, activation), which then is an algebraic variable."""
+
+
+class Compositions(NamedTuple):
+    """How a sensor is evaluated; a composed one needs no kernel."""
+
+    none: int = 0
+    """By its own kernel."""
+    reaction: int = 1
+    """Load of `Placement.constraint` on one of its bodies. Integers: offset of that body, of the body whose axes are
+    used (-1: the ground); numbers: the point, from the centre of mass."""
+    joint_moment: int = 2
+    """Moment of `Placement.sources` on all bodies of the placement but the first. Numbers: centre and axis on the
+    first body, see MOMENT."""
+
+
+class MomentNumbers(NamedTuple):
+    """Places of the numbers of a joint moment."""
+
+    centre: int = 0
+    """From the centre of mass [m]."""
+    axis: int = 3
+
+
+COMPOSITIONS, MOMENT = Compositions(), MomentNumbers()
 
 
 class Pattern(NamedTuple):
@@ -105,7 +145,7 @@ class Placement:
     constraint: str = ""
     """Sensors only: the constraint whose multipliers are handed in as lam."""
     sources: tuple[str, ...] = field(default=())
-    """Composite sensors only: elements whose own kernels are evaluated first."""
+    """Composed sensors only: elements whose own kernels are evaluated first."""
 
     @property
     def size(self) -> int:
@@ -113,46 +153,22 @@ class Placement:
         return 7 * len(self.bodies) + len(self.coordinates)
 
 
-class Declaration(BaseModel):
+class Declaration(Checked):
     """A named, frozen, validated part of a system. Wrong values raise ModelError with name, key and value."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    wrong: ClassVar[type[DmsError]] = ModelError
     kind: ClassVar[str] = ""
     name: str = Field(min_length=1, description="unique name")
-
-    def __init__(self, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise ModelError(explain(type(self), data, error)) from None
-
-
-def explain(cls: type[BaseModel], data: dict[str, Any], error: ValidationError) -> str:
-    """One sentence per mistake: which element, which key, what value, what would be right."""
-    label = getattr(cls, "kind", "") or cls.__name__
-    who = f"{label} '{data.get('name', '?')}'" if "name" in cls.model_fields else label
-    lines = []
-    for e in error.errors():
-        key = ".".join(str(x) for x in e["loc"])
-        right = e["msg"].removeprefix("Value error, ").removeprefix("Input ").rstrip(".")
-        if e["type"] == "extra_forbidden":
-            lines.append(f"{who}: unknown key '{key}'. Allowed: {choices(cls.model_fields)}.")
-        elif e["type"] == "missing":
-            lines.append(f"{who}: '{key}' is missing.")
-        elif not key:
-            lines.append(f"{who}: {right}.")
-        elif isinstance(e.get("ctx", {}).get("error"), DmsError):
-            # A part with checks of its own (a path point, a signal) has named key and value already.
-            lines.append(f"{who}: {key}: {right}.")
-        else:
-            lines.append(f"{who}: {key} = {e['input']!r}: {right}.")
-    return "\n".join(lines)
 
 
 class DynamicElement(Declaration):
     """Anything that writes rows of M vdot + phi_q^T lam - f = 0."""
 
     kernel: ClassVar[Any] = None
+    input_kernel: ClassVar[Any] = None
+    """Derivatives of the rows by inputs; None where they are to be found by differences."""
+    parameter_kernel: ClassVar[Any] = None
+    """Derivatives of the rows by the numbers of the placement; None where they are to be found by differences."""
 
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Coordinates this element owns, by local name; the system prefixes '<element>.'."""
@@ -185,10 +201,27 @@ class Constraint(Declaration):
     """Equations phi(q, u) = 0."""
 
     kernel: ClassVar[Any] = None
+    own_points: ClassVar[tuple[int, ...]] = ()
+    """Places in `Placement.numbers` of the constraint's own point on its first and its second body, from the centre of
+    mass [m]: where a reaction is measured by default. Without them that is the centre of mass."""
 
     def rows(self) -> tuple[str, ...]:
         """Names of the equations, in the kernel's order."""
         raise NotImplementedError
+
+    def aligned(self, numbers: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Directions of the first body and those of the second that coincide with them, as rows, shapes (k, 3) each.
+
+        A joint whose equations also hold with a body turned over declares them, so that assembly can refuse that.
+
+        Args:
+            numbers: those of the placement.
+        """
+        return np.zeros((0, 3)), np.zeros((0, 3))
+
+    def welded(self) -> tuple[str, ...]:
+        """Bodies that this constraint leaves no freedom relative to each other; none unless it is a weld."""
+        return ()
 
     def place(self, system) -> Placement:
         """Bodies, coordinates, inputs and tables of the kernel call."""
@@ -199,6 +232,7 @@ class Sensor(Declaration):
     """Measured quantities y = h(q, v, vdot, lam, u)."""
 
     kernel: ClassVar[Any] = None
+    composition: ClassVar[int] = COMPOSITIONS.none
 
     def outputs(self) -> tuple[tuple[str, str], ...]:
         """(name, unit) of each component; names are suffixes of the sensor's own name, '' for a scalar."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 from scipy.interpolate import CubicSpline
 
-from dms_core.errors import InputError
-from dms_core.model.element import Declaration, explain
+from dms_core.model.element import Declaration
+from dms_core.validation import Checked
 
 DEGREE = 5
 """Highest degree of a polynomial piece: a minimum-jerk movement is a quintic (Flash and Hogan 1985)."""
@@ -37,16 +37,8 @@ def _pieces(t, columns, jumps=()) -> Pieces:
     return Pieces(np.asarray(t, float), c, np.asarray(jumps, float))
 
 
-class Signal(BaseModel):
+class Signal(Checked):
     """Base of every signal."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    def __init__(self, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise InputError(explain(type(self), data, error)) from None
 
     def pieces(self) -> Pieces:
         """The polynomial pieces that represent this signal."""

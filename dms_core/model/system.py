@@ -40,7 +40,9 @@ class System:
         self.name = name
         self.bodies = self._checked("bodies", bodies, Body)
         norms = tuple(EulerNorm(name=f"{b.name}.euler_norm", body=b.name) for b in self.bodies if b.rigid)
-        self.constraints = norms + self._checked("constraints", constraints, Constraint)
+        # Those of another system may be among the constraints that were taken over from it.
+        declared = tuple(c for c in self._checked("constraints", constraints, Constraint) if c not in norms)
+        self.constraints = norms + declared
         self.forces = self._checked("forces", forces, Force)
         self.sensors = self._checked("sensors", sensors, Sensor)
         self.inputs = self._checked("inputs", inputs, Input)

@@ -11,42 +11,28 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import with_settings
-from dms_core.compiled.arena import Packed
+from dms_core.compiled.arena import Packed, inner
 from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
-from dms_core.simulation import step_control
-from dms_core.simulation.state import (
-    FACTORISATIONS,
-    H_LEAST,
-    H_MOST,
-    H_WANTED,
-    ITERATIONS,
-    MU,
-    PHI,
-    PHI_V,
-    REJECTED_ERROR,
-    REJECTED_NEWTON,
-    RESTART,
-    RESTARTS,
-    STEPS,
-    Options,
-    State,
-    T,
-    with_tables,
-)
+from dms_core.simulation.addresses import part_addresses
+from dms_core.simulation.inspection import Inspection
+from dms_core.simulation.parts import advance, restart
+from dms_core.simulation.snapshot import Snapshot
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, State, new_state, with_tables
+from dms_core.simulation.step_control import OUTCOME
 
 BUFFER_ROWS = 256
 """Steps recorded between two returns to Python: short enough for a smooth progress bar."""
 
 RESULT_OF = {
-    step_control.DONE: Result.SUCCESS,
-    step_control.STEP_TOO_SMALL: Result.STEP_TOO_SMALL,
-    step_control.NEWTON_FAILED: Result.NEWTON_FAILED,
-    step_control.MATRIX_SINGULAR: Result.MATRIX_SINGULAR,
-    step_control.TOO_MANY_STEPS: Result.TOO_MANY_STEPS,
-    step_control.RATES_FAILED: Result.RATES_FAILED,
+    OUTCOME.done: Result.SUCCESS,
+    OUTCOME.step_too_small: Result.STEP_TOO_SMALL,
+    OUTCOME.newton_failed: Result.NEWTON_FAILED,
+    OUTCOME.matrix_singular: Result.MATRIX_SINGULAR,
+    OUTCOME.too_many_steps: Result.TOO_MANY_STEPS,
+    OUTCOME.rates_failed: Result.RATES_FAILED,
 }
 
 
@@ -88,12 +74,13 @@ class SolverOptions:
     def numbers(self) -> Options:
         """For compiled code."""
         return Options(
-            self.rtol, self.atol or 0.0, self.fixed_step or 0.0, self.h_max, self.h_min, self.newton_tol,
-            self.constraint_tol, self.max_steps, int(self.method == "sdirk2"),
+            float(self.rtol), float(self.atol or 0.0), float(self.fixed_step or 0.0), float(self.h_max),
+            float(self.h_min), float(self.newton_tol), float(self.constraint_tol), int(self.max_steps),
+            int(self.method == "sdirk2"),
         )  # fmt: skip
 
 
-class World:
+class World(Inspection):
     """One world that is advanced in time, with inputs set between calls; it remembers the present only.
 
     Args:
@@ -106,7 +93,10 @@ class World:
         self.options = options or SolverOptions()
         self._numbers = self.options.numbers()
         self._tables: Packed = self.model.tables
-        self._world = self.model.new_state()
+        start = self.model.start
+        self._world = new_state(
+            self._tables.values, self.model.new_work(), self.model.new_signals(), part_addresses(), start.q, start.v
+        )
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
@@ -124,7 +114,7 @@ class World:
     @property
     def time(self) -> float:
         """Time reached [s]."""
-        return float(self.state.clock[T])
+        return float(self.state.clock[CLOCK.t])
 
     def set_input(self, name: str, value: float) -> None:
         """Hold the input `name` at `value` from now on; the method starts afresh behind the jump.
@@ -148,7 +138,7 @@ class World:
         if self.state.signals.c[row, 0] == value:
             return False
         self.state.signals.c[row, 0] = value
-        self.state.counts[RESTART] = 1
+        self.state.counts[COUNTS.restart] = 1
         return True
 
     def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
@@ -161,7 +151,7 @@ class World:
             raise InputError(f"t_end = {t_end} s; a time not before the present {self.time:.6g} s is wanted.")
         try:
             code, stuck = self._advance(float(t_end), progress), -math.inf
-            while code == step_control.MATRIX_SINGULAR:
+            while code == OUTCOME.matrix_singular:
                 if not (self.reorder() if self.time > stuck else self._shorten()):
                     break
                 stuck = self.time
@@ -173,12 +163,10 @@ class World:
         return self.result
 
     def _advance(self, t_end: float, progress: Callable[[float], None] | None) -> int:
-        """Step until t_end, draining the record; gives the code of step_control."""
-        code = step_control.BUFFER_FULL
-        while code == step_control.BUFFER_FULL:
-            code, count = step_control.advance(
-                self._tables.table, self._world.table, self._numbers, t_end, self._buffer, 0
-            )
+        """Step until t_end, draining the record; gives a code of OUTCOME."""
+        code = OUTCOME.buffer_full
+        while code == OUTCOME.buffer_full:
+            code, count = advance(self._tables.table, self._world.table, self._numbers, t_end, self._buffer, 0)
             self._keep(self._buffer[:count])
             if progress is not None:
                 progress(self.time)
@@ -200,7 +188,7 @@ class World:
 
     def settle(self) -> Result:
         """Accelerations and multipliers of the present state under the present inputs, for reading before a step."""
-        code = step_control.restart(self._tables.table, self._world.table, self._numbers)
+        code = restart(self._tables.table, self._world.table, self._numbers)
         self.result = Result.SUCCESS if code else Result.RATES_FAILED
         return self.result
 
@@ -213,24 +201,39 @@ class World:
         y = np.empty(len(self.model.layout.outputs)) if out is None else out
         present = np.zeros(1, bool)
         self.model.measure_into(
-            self._world.table, np.array([self.time]), s.q[None], s.v[None], s.vd[None], s.lam[None], present, y[None]
+            inner(self._world.table, STATE.signals),
+            np.array([self.time]),
+            s.q[None],
+            s.v[None],
+            s.vd[None],
+            s.lam[None],
+            present,
+            y[None],
         )
         return y
 
     def _shorten(self) -> bool:
         """A quarter of the step for a matrix that is singular far from the present state; False below the smallest."""
         clock = self.state.clock
-        clock[H_WANTED] *= 0.25
-        return self.options.fixed_step is None and bool(clock[H_WANTED] > self.options.h_min)
+        clock[CLOCK.h_wanted] *= 0.25
+        return self.options.fixed_step is None and bool(clock[CLOCK.h_wanted] > self.options.h_min)
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
         c, x = self.state.counts, self.state.largest
         return SolveStats(
-            int(c[STEPS]), int(c[REJECTED_ERROR]), int(c[REJECTED_NEWTON]), int(c[ITERATIONS]), int(c[FACTORISATIONS]),
-            int(c[RESTARTS]), float(x[PHI]), float(x[PHI_V]), float(x[MU]),
-            float(x[H_LEAST]) if c[STEPS] else 0.0, float(x[H_MOST]),
-        )  # fmt: skip
+            steps=int(c[COUNTS.steps]),
+            rejected_error=int(c[COUNTS.rejected_error]),
+            rejected_newton=int(c[COUNTS.rejected_newton]),
+            newton_iterations=int(c[COUNTS.iterations]),
+            factorisations=int(c[COUNTS.factorisations]),
+            restarts=int(c[COUNTS.restarts]),
+            largest_phi=float(x[LARGEST.phi]),
+            largest_phi_v=float(x[LARGEST.phi_v]),
+            largest_mu=float(x[LARGEST.mu]),
+            smallest_step=float(x[LARGEST.h_least]) if c[COUNTS.steps] else 0.0,
+            largest_step=float(x[LARGEST.h_most]),
+        )
 
 
 class Simulation(World):
@@ -256,6 +259,19 @@ class Simulation(World):
 
     def _keep(self, rows: np.ndarray) -> None:
         self._rows.append(rows.copy())
+
+    def restore(self, past: Snapshot) -> None:
+        """As in World. What was recorded is forgotten: the trajectory begins at the restored time.
+
+        Raises:
+            InputError: the snapshot belongs to another model, to other numbers of it, or to other options.
+        """
+        super().restore(past)
+        s = self.state
+        self._settings = {}
+        # At the start and behind a jump the next step records where it begins, with rates that belong to it.
+        present = np.concatenate([[self.time], s.q, s.v, s.vd, s.lam, s.mu])
+        self._rows = [present[None]] if not s.counts[COUNTS.restart] else []
 
     def trajectory(self) -> Trajectory:
         """Everything computed so far."""

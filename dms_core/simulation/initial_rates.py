@@ -5,26 +5,17 @@
 solved for vdot of second-order coordinates, v of first-order ones, and lam. Rigid bodies enter linearly; the fibres'
 force-velocity curve makes it a Newton iteration, shortened where it turns back. Two cheaper ways serve SDIRK2:
 `stage_rates` behind a step, whose first-order rates are right already, and `jump_rates` behind a jump of the inputs,
-which changes first-order rates and accelerations linearly and leaves the matrix of the step before valid.
+which changes first-order rates and accelerations linearly and leaves the matrix of the step before valid. All three are
+called with a c0, which only `stage_rates` uses.
 """
 
 import math
 
-from dms_core.assembly.tables import WORK
+from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import flags, floats, inner, ints, naturals, number
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.parts import BOTH_MATRICES, RATE_MATRIX, RATE_SOLUTION, RESIDUAL, run_part
-from dms_core.simulation.state import (
-    AGE,
-    C0_FACTORED,
-    CONTRACTION,
-    FACTORISATIONS,
-    MODEL,
-    PIVOT,
-    RATES_FACTORED,
-    STALE,
-    STATE,
-)
+from dms_core.simulation.parts import PARTS, run_part
+from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 MAX_ITERATIONS = 60
 SMALL_CHANGE = 0.02
@@ -69,10 +60,10 @@ def _correct(m, s, part):
         b[i] = -r2[free[i]]
     for k in range(active.shape[0]):
         b[n + k] = -phi_a[active[k]]
-    ints(s, STATE.counts)[FACTORISATIONS] += 1
-    if not floats(s, STATE.clock)[PIVOT] > 0.0:
+    ints(s, STATE.counts)[COUNTS.factorisations] += 1
+    if not floats(s, STATE.clock)[CLOCK.pivot] > 0.0:
         return False
-    run_part(m, s, RATE_SOLUTION)
+    run_part(m, s, PARTS.rate_solution)
     return True
 
 
@@ -107,7 +98,7 @@ def _iterate(m, s):
     """Newton's method for the rates, from the present guess; False if it does not converge."""
     floats(s, STATE.x_before)[:] = 0.0
     for _ in range(MAX_ITERATIONS):
-        if not _correct(m, s, RATE_MATRIX):
+        if not _correct(m, s, PARTS.rate_matrix):
             return False
         _shorten(m, s)
         change = _change(m, s)
@@ -146,17 +137,17 @@ def _take_rates(m, s):
     for k in range(lam.shape[0]):
         lam[k] = lam_before[k] = lam_w[k]
         mu[k] = 0.0
-    ints(s, STATE.counts)[RATES_FACTORED] = 1
+    ints(s, STATE.counts)[COUNTS.rates_factored] = 1
 
 
 @compiled
-def consistent_rates(m, s):
+def consistent_rates(m, s, _c0):
     """Fill v (first-order), qd, vd, lam of the state at its q, v and the inputs in w.u; False on failure."""
     _put_state(m, s)
     if not _iterate(m, s):
         return False
     _take_rates(m, s)
-    ints(s, STATE.counts)[STALE] = 1
+    ints(s, STATE.counts)[COUNTS.stale] = 1
     return True
 
 
@@ -168,12 +159,12 @@ def stage_rates(m, s, c0):
     With c0 > 0 the derivatives serve the Newton matrix of the next step as well.
     """
     clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
-    part = RATE_MATRIX
+    part = PARTS.rate_matrix
     if c0 > 0.0:
-        part = BOTH_MATRICES
-        clock[C0_FACTORED], clock[CONTRACTION] = c0, 0.0
-        count[FACTORISATIONS] += 1
-        count[AGE] = 0
+        part = PARTS.both_matrices
+        clock[CLOCK.c0_factored], clock[CLOCK.contraction] = c0, 0.0
+        count[COUNTS.factorisations] += 1
+        count[COUNTS.age] = 0
     _put_state(m, s)
     if not _correct(m, s, part) or not _first_order_change(m, s) < SMALL_CHANGE:
         return False
@@ -184,22 +175,22 @@ def stage_rates(m, s, c0):
 
 
 @compiled
-def jump_rates(m, s):
+def jump_rates(m, s, _c0):
     """As consistent_rates behind a jump of the inputs, with the factors at hand; False without them or with a driver.
 
     q and v are those of the factors, and only rows of equations that read an input are open. Where one reads it not
     linearly, what is left over concerns the guess and the error estimate of the step alone.
     """
-    if ints(s, STATE.counts)[RATES_FACTORED] != 1 or number(m, MODEL.driven) > 0:
+    if ints(s, STATE.counts)[COUNTS.rates_factored] != 1 or number(m, MODEL.driven) > 0:
         return False
     _put_state(m, s)
-    run_part(m, s, RESIDUAL)
+    run_part(m, s, PARTS.residual)
     b, r2 = floats(s, STATE.rate_b), floats(inner(s, STATE.w), WORK.r2)
     free = naturals(m, MODEL.free)
     b[:] = 0.0
     for i in range(free.shape[0]):
         b[i] = -r2[free[i]]
-    run_part(m, s, RATE_SOLUTION)
+    run_part(m, s, PARTS.rate_solution)
     if not _change(m, s) < math.inf:
         return False
     _take_rates(m, s)

@@ -6,27 +6,29 @@ iteration contracts; corrections of a step that does not reduce the simplified N
 """
 
 import math
+from typing import NamedTuple
 
-from dms_core.assembly.tables import WORK
-from dms_core.compiled.arena import floats, inner, ints, naturals
+from dms_core.assembly.tables import MODEL, WORK
+from dms_core.compiled.arena import fields, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.parts import CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RESIDUAL, SINGULAR_PIVOT, run_part
-from dms_core.simulation.state import (
-    AGE,
-    C0_FACTORED,
-    CONTRACTION,
-    FACTORISATIONS,
-    ITERATIONS,
-    MODEL,
-    MU,
-    PHI,
-    PHI_V,
-    PIVOT,
-    STALE,
-    STATE,
-)
+from dms_core.simulation.parts import PARTS, SINGULAR_PIVOT, run_part
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
 
-CONVERGED, STALE_MATRIX, DIVERGED, SINGULAR, NOT_FINITE = range(5)
+
+class Newton(NamedTuple):
+    """How the iteration for a stage ended."""
+
+    converged: int
+    stale_matrix: int
+    """The old matrix does not contract; it is to be renewed."""
+    diverged: int
+    singular: int
+    not_finite: int
+    """The residual is no number."""
+
+
+NEWTON = fields(Newton)
+
 MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
@@ -94,31 +96,31 @@ def correction_norm(m, s, c0):
 def refresh(m, s, c0):
     """Evaluate residual and matrix here and factorise; False if the matrix is singular."""
     clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
-    clock[C0_FACTORED] = c0
-    count[FACTORISATIONS] += 1
-    count[STALE] = 0
-    count[AGE] = 0
-    clock[CONTRACTION] = 0.0
-    run_part(m, s, NEWTON_MATRIX)
-    return clock[PIVOT] > SINGULAR_PIVOT
+    clock[CLOCK.c0_factored] = c0
+    count[COUNTS.factorisations] += 1
+    count[COUNTS.stale] = 0
+    count[COUNTS.age] = 0
+    clock[CLOCK.contraction] = 0.0
+    run_part(m, s, PARTS.newton_matrix)
+    return clock[CLOCK.pivot] > SINGULAR_PIVOT
 
 
 @compiled
 def failure(m, s, c0):
-    """Why `refresh` failed: NOT_FINITE where the residual is no number (a smaller step may help), else SINGULAR."""
+    """Why `refresh` failed: not finite (a smaller step may help) or singular."""
     right_hand_side(m, s, c0)
     b, total = floats(s, STATE.b), 0.0
     for i in range(b.shape[0]):
         total += abs(b[i])
-    return SINGULAR if total < math.inf else NOT_FINITE
+    return NEWTON.singular if total < math.inf else NEWTON.not_finite
 
 
 @compiled
 def correction(m, s, c0):
     """Newton correction x at the present iterate, with the matrix at hand; gives its norm."""
     right_hand_side(m, s, c0)
-    run_part(m, s, NEWTON_SOLUTION)
-    ints(s, STATE.counts)[ITERATIONS] += 1
+    run_part(m, s, PARTS.newton_solution)
+    ints(s, STATE.counts)[COUNTS.iterations] += 1
     return correction_norm(m, s, c0)
 
 
@@ -141,10 +143,10 @@ def note_errors(s):
     """Keep the largest constraint errors and |mu| of the run."""
     largest, mu = floats(s, STATE.largest), floats(inner(s, STATE.w), WORK.mu)
     phi, phi_v = largest_errors(s)
-    largest[PHI] = max(largest[PHI], phi)
-    largest[PHI_V] = max(largest[PHI_V], phi_v)
+    largest[LARGEST.phi] = max(largest[LARGEST.phi], phi)
+    largest[LARGEST.phi_v] = max(largest[LARGEST.phi_v], phi_v)
     for k in range(mu.shape[0]):
-        largest[MU] = max(largest[MU], abs(mu[k]))
+        largest[LARGEST.mu] = max(largest[LARGEST.mu], abs(mu[k]))
 
 
 @compiled
@@ -154,7 +156,7 @@ def line_search(m, s, c0, before):
     for _ in range(MAX_HALVINGS):
         share *= 0.5
         apply(m, s, c0, floats(s, STATE.x_before), -share)
-        run_part(m, s, RESIDUAL)
+        run_part(m, s, PARTS.residual)
         norm = correction(m, s, c0)
         if norm < before:
             return norm
@@ -173,7 +175,7 @@ def close_constraints(m, s, o, c0):
     phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
     n, k = naturals(m, MODEL.free).shape[0], active.shape[0]
     for _ in range(MAX_CLOSINGS):
-        run_part(m, s, CONSTRAINTS)
+        run_part(m, s, PARTS.constraints)
         error, error_v = largest_errors(s)
         if error <= o.constraint_tol and error_v <= o.constraint_tol * max(1.0, 1e-3 * c0):
             return True
@@ -181,7 +183,7 @@ def close_constraints(m, s, o, c0):
         for i in range(k):
             b[2 * n + i] = -phi[active[i]]
             b[2 * n + k + i] = -phi_v[active[i]] / c0
-        run_part(m, s, NEWTON_SOLUTION)
+        run_part(m, s, PARTS.newton_solution)
         apply(m, s, c0, x, 1.0)
     return False
 
@@ -190,7 +192,7 @@ def close_constraints(m, s, o, c0):
 def newton(m, s, o, c0, close):
     """Solve the stage from the guess in w; `close` brings the constraints to their tolerance. Gives (code, iterations).
 
-    STALE_MATRIX asks the caller to put the guess back and to call again with count[STALE] = 1.
+    NEWTON.stale_matrix asks the caller to put the guess back and to call again with a stale matrix noted in the counts.
     """
     clock, count, x, x_before = (
         floats(s, STATE.clock),
@@ -199,36 +201,37 @@ def newton(m, s, o, c0, close):
         floats(s, STATE.x_before),
     )
     set_rates(s, c0)
-    fresh = count[STALE] == 1 or abs(c0 / clock[C0_FACTORED] - 1.0) > C0_CHANGE
+    fresh = count[COUNTS.stale] == 1 or abs(c0 / clock[CLOCK.c0_factored] - 1.0) > C0_CHANGE
     if fresh:
         if not refresh(m, s, c0):
             return failure(m, s, c0), 0
     else:
-        run_part(m, s, RESIDUAL)
-    contraction, before = clock[CONTRACTION], 0.0
+        run_part(m, s, PARTS.residual)
+    contraction, before = clock[CLOCK.contraction], 0.0
     for k in range(MAX_ITERATIONS):
         norm = correction(m, s, c0)
         if not norm < math.inf:
-            return (NOT_FINITE if fresh else STALE_MATRIX), k
+            return (NEWTON.not_finite if fresh else NEWTON.stale_matrix), k
         if k > 0:
             if norm > before and norm > o.newton_tol:
                 if not fresh:
-                    return STALE_MATRIX, k
+                    return NEWTON.stale_matrix, k
                 norm = line_search(m, s, c0, before)
                 if not norm < math.inf:
-                    return DIVERGED, k
+                    return NEWTON.diverged, k
             contraction = min(norm / before, 0.99) if before > 0.0 else 0.0
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
         left = norm * (contraction / (1.0 - contraction) if k > 0 else 3.0 * max(contraction, SLOW))
         if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
-            clock[CONTRACTION] = contraction
+            clock[CLOCK.contraction] = contraction
             if k > 1 and contraction > SLOW:
-                count[STALE] = 1
-            return CONVERGED, k + 1
+                count[COUNTS.stale] = 1
+            return NEWTON.converged, k + 1
         if k >= 3 and not fresh and contraction > SLOW:
-            return STALE_MATRIX, k
-        x_before[:] = x
+            return NEWTON.stale_matrix, k
+        for i in range(x.shape[0]):
+            x_before[i] = x[i]
         before = norm
         rest = norm * contraction ** (MAX_ITERATIONS - 1 - k) / (1.0 - contraction)
         if k > 0 and fresh and rest > o.newton_tol:
@@ -237,5 +240,5 @@ def newton(m, s, o, c0, close):
             if not refresh(m, s, c0):
                 return failure(m, s, c0), k
         else:
-            run_part(m, s, RESIDUAL)
-    return (DIVERGED if fresh else STALE_MATRIX), MAX_ITERATIONS
+            run_part(m, s, PARTS.residual)
+    return (NEWTON.diverged if fresh else NEWTON.stale_matrix), MAX_ITERATIONS

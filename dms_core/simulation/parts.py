@@ -1,116 +1,115 @@
 """The large parts of a step, called by address.
 
 numba optimises everything that a function calls as a part of that function, so that a tower of ten functions over the
-residual would optimise the residual ten times. Behind an address a part is compiled once; each reads and writes the
-packed model m and world s only.
+residual would optimise the residual ten times. Behind an address a part is compiled once. The addresses are those of
+the world, `State.parts`; addresses.py fills them in.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from dms_core.assembly.residual import (
-    evaluate_both,
-    evaluate_constraints,
-    evaluate_inputs,
-    evaluate_newton,
-    evaluate_rates,
-    evaluate_residual,
-)
-from dms_core.compiled.arena import floats, inner, ints
-from dms_core.compiled.calls import PART, address, call_part
+from numba import typeof, types
+from numba.extending import intrinsic
+
+from dms_core.compiled.arena import fields, floats, ints
+from dms_core.compiled.calls import TABLE, call_by_address, call_part
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.linear_solve import back_substitute, factorise
-from dms_core.simulation.state import BEFORE_JUMP, C0_FACTORED, MODEL, PIVOT, STALE, STATE, T_INPUTS
+from dms_core.simulation.state import CLOCK, COUNTS, STATE, Options
 
 SINGULAR_PIVOT = 1e-14
 """Pivot, relative to its row, that is rounding: the order of elimination is then chosen anew."""
-INPUTS, RESIDUAL, CONSTRAINTS, NEWTON_MATRIX, NEWTON_SOLUTION, RATE_MATRIX, RATE_SOLUTION, BOTH_MATRICES = range(8)
 
 
-@compiled
-def _inputs(m, s):
-    """Inputs at clock[T_INPUTS], from the left or the right of a jump."""
-    before = ints(s, STATE.counts)[BEFORE_JUMP] == 1
-    evaluate_inputs(inner(s, STATE.signals), floats(s, STATE.clock)[T_INPUTS], before, inner(s, STATE.w))
+class Parts(NamedTuple):
+    """Places in `State.parts`. The first eight, of evaluation.py, read and write m and s only."""
+
+    inputs: int
+    residual: int
+    constraints: int
+    newton_matrix: int
+    newton_solution: int
+    rate_matrix: int
+    rate_solution: int
+    both_matrices: int
+    solve_stage: int
+    """implicit_stage.py"""
+    consistent_rates: int
+    stage_rates: int
+    jump_rates: int
+    """initial_rates.py"""
+    restart: int
+    advance: int
+    """step_control.py"""
 
 
-@compiled
-def _residual(m, s):
-    """The residual at the present iterate."""
-    evaluate_residual(inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(s, STATE.w))
+PARTS = fields(Parts)
+
+_OPTIONS = typeof(Options(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0))
+_RECORD = types.Array(types.float64, 2, "C")
+_PAIR = types.UniTuple(types.int64, 2)
+STAGE = _PAIR(TABLE, TABLE, _OPTIONS, types.float64, types.float64, types.float64, types.boolean)
+RATES = types.boolean(TABLE, TABLE, types.float64)
+RESTART = types.boolean(TABLE, TABLE, _OPTIONS)
+ADVANCE = _PAIR(TABLE, TABLE, _OPTIONS, types.float64, _RECORD, types.int64)
 
 
-@compiled
-def _constraints(m, s):
-    """phi and phi_q v + phi_t at the present iterate."""
-    evaluate_constraints(inner(m, MODEL.constraints), inner(s, STATE.w))
+@intrinsic
+def _call_stage(typingctx, address, m, s, o, t, c0, lam_slope, last):  # noqa: ANN001, ANN202
+    return call_by_address(STAGE)
 
 
-@compiled
-def _newton_matrix(m, s):
-    """Residual, factorised Newton matrix for c0 = clock[C0_FACTORED], and clock[PIVOT], its smallest relative pivot."""
-    clock, values, w = floats(s, STATE.clock), floats(s, STATE.newton_values), inner(s, STATE.w)
-    dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
-    evaluate_newton(dynamics, constraints, inner(m, MODEL.newton), w, clock[C0_FACTORED], values)
-    clock[PIVOT] = factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work))
+@intrinsic
+def _call_rates(typingctx, address, m, s, c0):  # noqa: ANN001, ANN202
+    return call_by_address(RATES)
 
 
-@compiled
-def _newton_solution(m, s):
-    """x from b."""
-    values, work = floats(s, STATE.newton_values), floats(s, STATE.newton_work)
-    back_substitute(m, MODEL.newton_lu, values, floats(s, STATE.b), floats(s, STATE.x), work)
+@intrinsic
+def _call_restart(typingctx, address, m, s, o):  # noqa: ANN001, ANN202
+    return call_by_address(RESTART)
 
 
-@compiled
-def _rate_matrix(m, s):
-    """Residual and factorised matrix of the acceleration problem; clock[PIVOT] as above."""
-    values = floats(s, STATE.rate_values)
-    dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
-    evaluate_rates(dynamics, constraints, inner(m, MODEL.rates), inner(s, STATE.w), values)
-    floats(s, STATE.clock)[PIVOT] = factorise(m, MODEL.rate_lu, values, floats(s, STATE.rate_work))
-
-
-@compiled
-def _rate_solution(m, s):
-    """rate_x from rate_b."""
-    values, work = floats(s, STATE.rate_values), floats(s, STATE.rate_work)
-    back_substitute(m, MODEL.rate_lu, values, floats(s, STATE.rate_b), floats(s, STATE.rate_x), work)
-
-
-@compiled
-def _both_matrices(m, s):
-    """As _rate_matrix, and the factorised Newton matrix for c0 = clock[C0_FACTORED] of the same state."""
-    clock, w = floats(s, STATE.clock), inner(s, STATE.w)
-    newton, rates = floats(s, STATE.newton_values), floats(s, STATE.rate_values)
-    evaluate_both(
-        inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.newton), inner(m, MODEL.rates), w,
-        clock[C0_FACTORED], newton, rates,
-    )  # fmt: skip
-    clock[PIVOT] = factorise(m, MODEL.newton_lu, newton, floats(s, STATE.newton_work))
-    ints(s, STATE.counts)[STALE] = 0 if clock[PIVOT] > SINGULAR_PIVOT else 1
-    clock[PIVOT] = factorise(m, MODEL.rate_lu, rates, floats(s, STATE.rate_work))
-
-
-def part_addresses() -> np.ndarray:
-    """Addresses of the parts in the order of their numbers, compiled or loaded here."""
-    parts = (
-        _inputs, _residual, _constraints, _newton_matrix, _newton_solution, _rate_matrix, _rate_solution,
-        _both_matrices,
-    )  # fmt: skip
-    return np.array([address(part, PART) for part in parts], np.int64)
+@intrinsic
+def _call_advance(typingctx, address, m, s, o, t_end, record, recorded):  # noqa: ANN001, ANN202
+    return call_by_address(ADVANCE)
 
 
 @compiled
 def run_part(m, s, part):
-    """Run one part."""
-    call_part(ints(m, MODEL.parts)[part], m, s)
+    """Run one of the parts of evaluation.py."""
+    call_part(ints(s, STATE.parts)[part], m, s)
+
+
+@compiled
+def run_stage(m, s, o, t, c0, lam_slope, last):
+    """Run `implicit_stage.solve_stage`."""
+    return _call_stage(ints(s, STATE.parts)[PARTS.solve_stage], m, s, o, t, c0, lam_slope, last)
+
+
+@compiled
+def run_rates(m, s, part, c0):
+    """Run one of the three functions of initial_rates.py that find accelerations and multipliers."""
+    return _call_rates(ints(s, STATE.parts)[part], m, s, c0)
+
+
+@compiled
+def restart(m, s, o):
+    """Accelerations and multipliers behind a jump, inputs from the right; False if there are none."""
+    return _call_restart(ints(s, STATE.parts)[PARTS.restart], m, s, o)
+
+
+@compiled
+def advance(m, s, o, t_end, record, recorded):
+    """Step until t_end; gives (code, number of rows recorded), see step_control.py.
+
+    OUTCOME.buffer_full asks to be called again with room. Nothing is recorded where the record has no rows at all.
+    """
+    return _call_advance(ints(s, STATE.parts)[PARTS.advance], m, s, o, t_end, record, recorded)
 
 
 @compiled
 def set_inputs(m, s, t, before):
     """Inputs at t; `before` takes the limit from the left at a jump."""
-    floats(s, STATE.clock)[T_INPUTS] = t
-    ints(s, STATE.counts)[BEFORE_JUMP] = 1 if before else 0
-    run_part(m, s, INPUTS)
+    floats(s, STATE.clock)[CLOCK.t_inputs] = t
+    ints(s, STATE.counts)[COUNTS.before_jump] = 1 if before else 0
+    run_part(m, s, PARTS.inputs)

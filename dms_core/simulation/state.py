@@ -1,4 +1,17 @@
-"""What the solver carries: constant tables of a model, mutable state of one world, options of a run."""
+"""What the solver carries: the mutable state of one world and the options of a run.
+
+Three letters stand for the arguments of compiled functions all over this package:
+
+    m    the model: a packed `Tables` (assembly/tables.py), constant, shared by all worlds of a model
+    s    the world: a packed `State`, which everything that a step computes is written into
+    o    an `Options` tuple: the numbers that steer a run
+
+A field is looked up by name, and so is a place in one of the arrays of single numbers:
+
+    clock = floats(s, STATE.clock)          t = clock[CLOCK.t]
+    counts = ints(s, STATE.counts)          counts[COUNTS.steps] += 1
+    free = naturals(m, MODEL.free)          q = floats(inner(s, STATE.w), WORK.q)
+"""
 
 from __future__ import annotations
 
@@ -7,43 +20,64 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.assembly.sparsity import NewtonPattern, RatePattern
-from dms_core.assembly.tables import WORK, Calls, Signals, Work
+from dms_core.assembly.tables import WORK, Signals, Tables, Work
 from dms_core.compiled.arena import Packed, fields, floats, inner, ints
 from dms_core.compiled.jit import compiled
-from dms_core.linear.lu import LuTables, storage
-
-# Entries of State.clock [s, unless said].
-T, H_BEFORE, H_BEFORE2, H_WANTED, C0_FACTORED, CONTRACTION, PIVOT, T_INPUTS, WORST = range(9)
-# Entries of State.counts.
-(STEPS, REJECTED_ERROR, REJECTED_NEWTON, ITERATIONS, FACTORISATIONS, RESTARTS,
- RESTART, STALE, AGE, BEFORE_JUMP, RATES_FACTORED) = range(11)  # fmt: skip
-# Entries of State.largest.
-PHI, PHI_V, MU, H_LEAST, H_MOST = range(5)
+from dms_core.linear.lu import storage
 
 
-class Tables(NamedTuple):
-    """Constants of a compiled model."""
+class Clock(NamedTuple):
+    """Places in `State.clock` [s, unless said]."""
 
-    dynamics: Calls
-    constraints: Calls
-    sensors: Calls
-    newton: NewtonPattern
-    newton_lu: LuTables
-    rates: RatePattern
-    rate_lu: LuTables
-    free: np.ndarray
-    """Coordinates that are solved for: all but those of welded bodies, (n_free,)."""
-    active: np.ndarray
-    """Constraint rows that are solved for, (n_active,)."""
-    second: np.ndarray
-    """True for second-order coordinates, whose vdot appears in their row, (n_q,)."""
-    scale_q: np.ndarray
-    scale_v: np.ndarray
-    driven: int
-    """Constraints that read an input: a jump of it opens rows of accelerations."""
-    parts: np.ndarray
-    """Addresses of the parts of a step, see parts.py."""
+    t: int
+    """Time reached."""
+    h_before: int
+    """Size of the last step."""
+    h_before2: int
+    """Size of the step before that one; 0 behind a start."""
+    h_wanted: int
+    """Size that the next step should have."""
+    c0_factored: int
+    """c0 of the factorised Newton matrix [1/s]."""
+    contraction: int
+    """Contraction that Newton's method showed last with that matrix [-]."""
+    pivot: int
+    """Smallest relative pivot of the last factorisation [-]."""
+    t_inputs: int
+    """Time at which inputs are evaluated."""
+    worst: int
+    """Largest local error over its tolerance since the last landing [-]."""
+
+
+class Counts(NamedTuple):
+    """Places in `State.counts`: what a run reports, then flags (1: true)."""
+
+    steps: int
+    rejected_error: int
+    rejected_newton: int
+    iterations: int
+    factorisations: int
+    restarts: int
+    restart: int
+    """The method starts afresh with the next step."""
+    stale: int
+    """The factorised Newton matrix is to be renewed."""
+    age: int
+    """Stages solved with it."""
+    before_jump: int
+    """Inputs are taken from the left of a jump."""
+    rates_factored: int
+    """The factorised matrix of the acceleration problem belongs to the present q and v."""
+
+
+class Largest(NamedTuple):
+    """Places in `State.largest`: extremes over a run, see `SolveStats`."""
+
+    phi: int
+    phi_v: int
+    mu: int
+    h_least: int
+    h_most: int
 
 
 class State(NamedTuple):
@@ -70,7 +104,7 @@ class State(NamedTuple):
     q_guess: np.ndarray
     v_guess: np.ndarray
     wq: np.ndarray
-    """Error weights of q: LOCAL_SHARE (bdf2.py) of atol + rtol |q|."""
+    """Error weights of q: LOCAL_SHARE (implicit_stage.py) of atol + rtol |q|."""
     wv: np.ndarray
     newton_values: np.ndarray
     newton_work: np.ndarray
@@ -81,6 +115,8 @@ class State(NamedTuple):
     rate_work: np.ndarray
     rate_b: np.ndarray
     rate_x: np.ndarray
+    parts: np.ndarray
+    """Addresses of the parts of a step, see parts.py."""
 
 
 class Options(NamedTuple):
@@ -100,7 +136,7 @@ class Options(NamedTuple):
     """1 for SDIRK2 throughout, 0 for BDF2 behind an SDIRK2 start."""
 
 
-MODEL, STATE = fields(Tables), fields(State)
+STATE, CLOCK, COUNTS, LARGEST = fields(State), fields(Clock), fields(Counts), fields(Largest)
 
 
 def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
@@ -117,12 +153,13 @@ def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
     }
 
 
-def new_state(tables: Tables, w: Work, signals: Signals, q: np.ndarray, v: np.ndarray) -> Packed:
-    """A world at its start: q and v of shape (n_q,)."""
+def new_state(tables: Tables, w: Work, signals: Signals, parts: np.ndarray, q: np.ndarray, v: np.ndarray) -> Packed:
+    """A world at its start: q and v of shape (n_q,); `parts` from `addresses.part_addresses`."""
     n, m = len(tables.second), len(w.lam)
     histories = ("q", "v", "qd", "vd", "q_before", "v_before", "cq", "cv", "q_guess", "v_guess", "wq", "wv")
     state = State(
-        w=w, signals=signals, clock=np.zeros(9), counts=np.zeros(11, np.int64), largest=np.zeros(5),
+        w=w, signals=signals, clock=np.zeros(len(CLOCK)),
+        counts=np.zeros(len(COUNTS), np.int64), largest=np.zeros(len(LARGEST)), parts=parts,
         **{name: np.zeros(n) for name in histories}, **{name: np.zeros(m) for name in ("lam", "mu", "lam_before")},
         **_linear_arrays(tables),
     )  # fmt: skip
@@ -142,16 +179,20 @@ def rewind(s, q, v, step):
     clock[:], counts[:], largest[:], floats(s, STATE.vd)[:] = 0.0, 0, 0.0, 0.0
     floats(s, STATE.lam)[:], floats(s, STATE.mu)[:], floats(s, STATE.lam_before)[:] = 0.0, 0.0, 0.0
     floats(w, WORK.lam)[:], floats(w, WORK.mu)[:] = 0.0, 0.0
-    counts[RESTART], counts[STALE] = 1, 1
-    largest[H_LEAST], clock[H_WANTED] = math.inf, step
-    floats(s, STATE.q)[:], floats(s, STATE.q_before)[:], floats(w, WORK.q)[:n] = q, q, q
-    floats(s, STATE.v)[:], floats(s, STATE.qd)[:], floats(s, STATE.v_before)[:], floats(w, WORK.v)[:n] = v, v, v, v
+    counts[COUNTS.restart], counts[COUNTS.stale] = 1, 1
+    largest[LARGEST.h_least], clock[CLOCK.h_wanted] = math.inf, step
+    q_s, q_before, q_w = floats(s, STATE.q), floats(s, STATE.q_before), floats(w, WORK.q)
+    v_s, qd, v_before, v_w = floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.v_before), floats(w, WORK.v)
+    # A loop: numba compiles the copy of an array to an array with all that it takes if they overlap.
+    for i in range(n):
+        q_s[i] = q_before[i] = q_w[i] = q[i]
+        v_s[i] = qd[i] = v_before[i] = v_w[i] = v[i]
 
 
 def with_tables(tables: Tables, state: State) -> Packed:
     """The same world for other rows and elimination orders: it starts afresh, with multipliers 0 as their guess."""
-    state.counts[RESTART] = state.counts[STALE] = 1
-    state.counts[RATES_FACTORED] = 0
+    state.counts[COUNTS.restart] = state.counts[COUNTS.stale] = 1
+    state.counts[COUNTS.rates_factored] = 0
     state.lam[:], state.mu[:] = 0.0, 0.0
     state.w.lam[:], state.w.mu[:] = 0.0, 0.0
     return Packed(State(**{**state._asdict(), **_linear_arrays(tables)}))

@@ -6,34 +6,32 @@ keeps the factorised matrix good.
 """
 
 import math
+from typing import NamedTuple
 
 from dms_core.assembly.tables import SIGNALS, WORK
-from dms_core.compiled.arena import floats, inner, ints
+from dms_core.compiled.arena import fields, floats, inner, ints
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.bdf2 import GAMMA, bdf2_step, set_weights, start_step
-from dms_core.simulation.initial_rates import consistent_rates, jump_rates, stage_rates
-from dms_core.simulation.newton import CONVERGED, MAX_ITERATIONS, SINGULAR, note_errors
-from dms_core.simulation.parts import set_inputs
-from dms_core.simulation.state import (
-    H_BEFORE,
-    H_BEFORE2,
-    H_LEAST,
-    H_MOST,
-    H_WANTED,
-    RATES_FACTORED,
-    REJECTED_ERROR,
-    REJECTED_NEWTON,
-    RESTART,
-    RESTARTS,
-    STALE,
-    STATE,
-    STEPS,
-    WORST,
-    T,
-)
+from dms_core.simulation.bdf2 import bdf2_step
+from dms_core.simulation.implicit_stage import set_weights
+from dms_core.simulation.newton import MAX_ITERATIONS, NEWTON, note_errors
+from dms_core.simulation.parts import PARTS, run_rates, set_inputs
+from dms_core.simulation.sdirk2 import GAMMA, sdirk2_step
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
 
-# Codes of `advance`; results.Result gives each its sentence.
-DONE, BUFFER_FULL, STEP_TOO_SMALL, NEWTON_FAILED, MATRIX_SINGULAR, TOO_MANY_STEPS, RATES_FAILED = range(7)
+
+class Outcome(NamedTuple):
+    """How `advance` ended; results.Result gives each its sentence."""
+
+    done: int
+    buffer_full: int
+    step_too_small: int
+    newton_failed: int
+    matrix_singular: int
+    too_many_steps: int
+    rates_failed: int
+
+
+OUTCOME = fields(Outcome)
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
@@ -46,7 +44,7 @@ NEAR = 32
 @compiled
 def next_stop(s, t_end):
     """The next time a step must end on: a jump of an input or the end."""
-    t, jumps = floats(s, STATE.clock)[T], floats(inner(s, STATE.signals), SIGNALS.jumps)
+    t, jumps = floats(s, STATE.clock)[CLOCK.t], floats(inner(s, STATE.signals), SIGNALS.jumps)
     for k in range(jumps.shape[0]):
         if jumps[k] > t:
             return min(t_end, jumps[k])
@@ -68,7 +66,7 @@ def record_point(s, record, k):
     q, v, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.vd)
     lam, mu = floats(s, STATE.lam), floats(s, STATE.mu)
     n, m = q.shape[0], lam.shape[0]
-    record[k, 0] = floats(s, STATE.clock)[T]
+    record[k, 0] = floats(s, STATE.clock)[CLOCK.t]
     for i in range(n):
         record[k, 1 + i] = q[i]
         record[k, 1 + n + i] = v[i]
@@ -97,28 +95,30 @@ def accept(s, h, c0, started):
     for k in range(lam.shape[0]):
         lam_before[k] = lam[k]
         lam[k], mu[k] = lam_new[k], mu_new[k]
-    clock[T] += h
-    clock[H_BEFORE2] = 0.0 if started else clock[H_BEFORE]
-    clock[H_BEFORE] = h
-    largest[H_LEAST] = min(largest[H_LEAST], h)
-    largest[H_MOST] = max(largest[H_MOST], h)
-    ints(s, STATE.counts)[STEPS] += 1
-    ints(s, STATE.counts)[RESTART] = 0
-    ints(s, STATE.counts)[RATES_FACTORED] = 0
+    clock[CLOCK.t] += h
+    clock[CLOCK.h_before2] = 0.0 if started else clock[CLOCK.h_before]
+    clock[CLOCK.h_before] = h
+    largest[LARGEST.h_least] = min(largest[LARGEST.h_least], h)
+    largest[LARGEST.h_most] = max(largest[LARGEST.h_most], h)
+    ints(s, STATE.counts)[COUNTS.steps] += 1
+    ints(s, STATE.counts)[COUNTS.restart] = 0
+    ints(s, STATE.counts)[COUNTS.rates_factored] = 0
 
 
 @compiled
-def restart(m, s, o):
+def restart_method(m, s, o):
     """Values just behind a jump: inputs from the right, consistent rates and multipliers; False if there are none."""
     clock = floats(s, STATE.clock)
-    set_inputs(m, s, clock[T], False)
-    ints(s, STATE.counts)[RESTARTS] += 1
-    clock[WORST] = 0.0
-    if not (o.one_step == 1 and jump_rates(m, s)) and not consistent_rates(m, s):
+    set_inputs(m, s, clock[CLOCK.t], False)
+    ints(s, STATE.counts)[COUNTS.restarts] += 1
+    clock[CLOCK.worst] = 0.0
+    if not (o.one_step == 1 and run_rates(m, s, PARTS.jump_rates, 0.0)) and not run_rates(
+        m, s, PARTS.consistent_rates, 0.0
+    ):
         return False
     set_weights(m, s, o)
-    if clock[H_WANTED] <= 0.0:
-        clock[H_WANTED] = first_step(s, o)
+    if clock[CLOCK.h_wanted] <= 0.0:
+        clock[CLOCK.h_wanted] = first_step(s, o)
     return True
 
 
@@ -136,9 +136,9 @@ def landing_size(h, rest, fixed, equal):
 def try_step(m, s, o, h, started):
     """One attempt; gives (code, iterations per stage, error, c0)."""
     if started:
-        code, iterations, error = start_step(m, s, o, h)
+        code, iterations, error = sdirk2_step(m, s, o, h)
         return code, 0.5 * iterations, error, 1.0 / (GAMMA * h)
-    ratio = h / floats(s, STATE.clock)[H_BEFORE]
+    ratio = h / floats(s, STATE.clock)[CLOCK.h_before]
     code, iterations, error = bdf2_step(m, s, o, h)
     return code, 1.0 * iterations, error, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h
 
@@ -154,40 +154,40 @@ def resize(h, error, iterations):
 
 @compiled
 def one_step(m, s, o, stop, kept):
-    """Attempts until one step is accepted; gives DONE or what went wrong. `kept`: the step is recorded."""
+    """Attempts until one step is accepted; gives OUTCOME.done or what went wrong. `kept`: the step is recorded."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
-    started = count[RESTART] == 1 or o.one_step == 1
+    started = count[COUNTS.restart] == 1 or o.one_step == 1
     set_weights(m, s, o)
-    wanted = o.fixed_step if fixed else min(clock[H_WANTED], o.h_max)
+    wanted = o.fixed_step if fixed else min(clock[CLOCK.h_wanted], o.h_max)
     if not fixed and wanted < o.h_min:
-        return STEP_TOO_SMALL
+        return OUTCOME.step_too_small
     if not started and not fixed:
-        wanted = min(wanted, GROW * clock[H_BEFORE])
-    rest = stop - clock[T]
+        wanted = min(wanted, GROW * clock[CLOCK.h_before])
+    rest = stop - clock[CLOCK.t]
     equal = o.one_step == 1 and not fixed and rest <= NEAR * wanted
     first_try = True
     while True:
         h = landing_size(wanted, rest, fixed, equal)
         code, iterations, error, c0 = try_step(m, s, o, h, started)
-        if code == SINGULAR:
-            return MATRIX_SINGULAR
-        if code == CONVERGED and (error <= 1.0 or fixed):
+        if code == NEWTON.singular:
+            return OUTCOME.matrix_singular
+        if code == NEWTON.converged and (error <= 1.0 or fixed):
             break
-        if code == CONVERGED:
-            count[REJECTED_ERROR] += 1
+        if code == NEWTON.converged:
+            count[COUNTS.rejected_error] += 1
             wanted = h * max(SHRINK, min(0.9, SAFETY * error ** (-1.0 / 3.0)))
         else:
-            count[REJECTED_NEWTON] += 1
-            count[STALE] = 1
+            count[COUNTS.rejected_newton] += 1
+            count[COUNTS.stale] = 1
             wanted = 0.25 * h
             # Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
             if first_try and o.one_step == 1:
-                set_inputs(m, s, clock[T], False)
-                if not consistent_rates(m, s):
-                    return RATES_FAILED
+                set_inputs(m, s, clock[CLOCK.t], False)
+                if not run_rates(m, s, PARTS.consistent_rates, 0.0):
+                    return OUTCOME.rates_failed
         first_try = False
         if fixed or wanted < o.h_min:
-            return STEP_TOO_SMALL if code == CONVERGED else NEWTON_FAILED
+            return OUTCOME.step_too_small if code == NEWTON.converged else OUTCOME.newton_failed
     note_errors(s)
     accept(s, h, c0, started)
     if h == rest:
@@ -196,52 +196,58 @@ def one_step(m, s, o, stop, kept):
     # throughout wants them between two landings only for a record.
     wanted_rates = kept or h == rest if o.one_step == 1 else started
     stage_c0 = c0 if h == rest else 0.0
-    if wanted_rates and not (o.one_step == 1 and stage_rates(m, s, stage_c0)) and not consistent_rates(m, s):
-        return RATES_FAILED
+    if (
+        wanted_rates
+        and not (o.one_step == 1 and run_rates(m, s, PARTS.stage_rates, stage_c0))
+        and not run_rates(m, s, PARTS.consistent_rates, 0.0)
+    ):
+        return OUTCOME.rates_failed
     if equal:
-        clock[WORST] = max(clock[WORST], error)
+        clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
         if h == rest or not first_try:
-            clock[H_WANTED] = max(resize(h, clock[WORST], iterations), wanted if h < wanted and first_try else 0.0)
-            clock[WORST] = 0.0
+            clock[CLOCK.h_wanted] = max(
+                resize(h, clock[CLOCK.worst], iterations), wanted if h < wanted and first_try else 0.0
+            )
+            clock[CLOCK.worst] = 0.0
     elif not fixed:
         size = resize(h, error, iterations)
         # A step cut short by a landing says little about the size that the motion allows.
-        clock[H_WANTED] = max(size, wanted) if h < wanted and first_try else size
-    return DONE
+        clock[CLOCK.h_wanted] = max(size, wanted) if h < wanted and first_try else size
+    return OUTCOME.done
 
 
 @compiled
 def land(s, stop):
     """Set the clock exactly; behind a jump of an input the method starts afresh."""
-    floats(s, STATE.clock)[T] = stop
+    floats(s, STATE.clock)[CLOCK.t] = stop
     jumps = floats(inner(s, STATE.signals), SIGNALS.jumps)
     for k in range(jumps.shape[0]):
         if jumps[k] == stop:
-            ints(s, STATE.counts)[RESTART] = 1
+            ints(s, STATE.counts)[COUNTS.restart] = 1
 
 
 @compiled
-def advance(m, s, o, t_end, record, recorded):
-    """Step until t_end; gives (code, number of rows recorded). BUFFER_FULL asks to be called again with room.
+def advance_method(m, s, o, t_end, record, recorded):
+    """Step until t_end; gives (code, number of rows recorded). OUTCOME.buffer_full asks to be called again with room.
 
     Nothing is recorded where the record has no rows at all.
     """
     clock, count, kept = floats(s, STATE.clock), ints(s, STATE.counts), record.shape[0] > 0
-    while clock[T] < t_end:
+    while clock[CLOCK.t] < t_end:
         if kept and recorded + 2 > record.shape[0]:
-            return BUFFER_FULL, recorded
-        if count[STEPS] >= o.max_steps:
-            return TOO_MANY_STEPS, recorded
-        if count[RESTART] == 1:
-            if not restart(m, s, o):
-                return RATES_FAILED, recorded
+            return OUTCOME.buffer_full, recorded
+        if count[COUNTS.steps] >= o.max_steps:
+            return OUTCOME.too_many_steps, recorded
+        if count[COUNTS.restart] == 1:
+            if not restart_method(m, s, o):
+                return OUTCOME.rates_failed, recorded
             if kept:
                 record_point(s, record, recorded)
                 recorded += 1
         code = one_step(m, s, o, next_stop(s, t_end), kept)
-        if code != DONE:
+        if code != OUTCOME.done:
             return code, recorded
         if kept:
             record_point(s, record, recorded)
             recorded += 1
-    return DONE, recorded
+    return OUTCOME.done, recorded

@@ -13,7 +13,7 @@ import numpy as np
 
 from dms_core.model.geometry.rotations import add, cross, dot, sub, turned, vec
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.model.muscles.muscle import fibre_at_rest, fibre_state, pennation_cosine, tendon_state
+from dms_core.model.muscles.muscle import MUSCLE, fibre_at_rest, fibre_state, pennation_cosine, tendon_state
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
 from exo_env.jit import compiled
 
@@ -138,14 +138,14 @@ def needed_moments(arm, load, course, moment):
 @compiled
 def tendon_length(par, force):
     """Length of the tendon that carries a force [m]: the inverse of the tendon curve."""
-    f, e_toe, k_lin = force / par[0], par[10], par[11]
+    f, e_toe, k_lin = force / par[MUSCLE.F0], par[MUSCLE.toe_strain], par[MUSCLE.tendon_slope]
     if f <= 0.0:
         strain = 0.0
     elif f <= TOE_FORCE:
         strain = e_toe / TOE_SHAPE * math.log1p(f * TOE_GROWTH / TOE_FORCE)
     else:
         strain = e_toe + (f - TOE_FORCE) / k_lin
-    return par[2] * (1.0 + strain)
+    return par[MUSCLE.Ls] * (1.0 + strain)
 
 
 @compiled
@@ -205,8 +205,8 @@ def forces(arm, interval, lengths, tendon_force, activations, fibre, full, passi
     for i in range(arm.muscles.shape[0]):
         par = arm.muscles[i]
         for k in range(n):
-            along = max(lengths[k, i] - tendon_length(par, tendon_force[k, i]), 1e-3 * par[1])
-            fibre[k] = math.hypot(along, par[3])
+            along = max(lengths[k, i] - tendon_length(par, tendon_force[k, i]), 1e-3 * par[MUSCLE.L0])
+            fibre[k] = math.hypot(along, par[MUSCLE.height])
         for k in range(n):
             here, there = min(k + 1, last), max(k - 1, 0)
             velocity = (fibre[here] - fibre[there]) / ((here - there) * interval)

@@ -12,7 +12,7 @@ import numpy as np
 
 from dms_core import Model, SolverOptions, World
 from dms_core.errors import InputError, SimulationError
-from dms_core.kernels import TABLE_CALL, Packed, address
+from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
 from dms_core.model import MinimumJerk
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
@@ -32,6 +32,7 @@ from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import Task
 from exo_env.world.draw import Draw
+from exo_env.world.episode_code import EPISODE_CODE
 from exo_env.world.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
 from exo_env.world.scaling import TEMPLATE_ANGLE, declared, scaling_of
 from exo_env.world.tables import (
@@ -51,6 +52,8 @@ from exo_env.world.tables import (
     TaskTables,
     WorldTables,
 )
+
+compile_beside_models(EPISODE_CODE)
 
 PLANNING = 0.05
 """Interval of the motor command's table [s]; a tenth of it would change an activation by 0.002."""

@@ -106,12 +106,12 @@ def muscle(**changes) -> ThelenMuscle:
 
 
 NUMBERS = {
-    "zero mass": (lambda: rod(mass=0.0), r"rigid_body 'rod': mass = 0.0: should be greater than 0"),
+    "zero mass": (lambda: rod(mass=0.0), r"rigid_body 'rod': mass = 0.0: Expected a number above 0"),
     "negative mass": (
         lambda: PointMass(name="ball", mass=-2.0),
-        r"point_mass 'ball': mass = -2.0: should be greater than 0",
+        r"point_mass 'ball': mass = -2.0: Expected a number above 0",
     ),
-    "infinite mass": (lambda: rod(mass=math.inf), r"rigid_body 'rod': mass = inf: should be a finite number"),
+    "infinite mass": (lambda: rod(mass=math.inf), r"rigid_body 'rod': mass = inf: Expected a finite number"),
     "negative inertia": (lambda: rod(inertia=(0.1, -0.1, 0.1)), r"principal moments .* must be positive"),
     "inertia of no body": (
         lambda: rod(inertia=(1.0, 1.0, 2.1)),
@@ -128,7 +128,7 @@ NUMBERS = {
     ),
     "negative tension": (
         lambda: RopeForce(name="rope", path=path_to("rod"), tension=-5.0),
-        r"rope_force 'rope': tension = -5.0: should be greater than or equal to 0",
+        r"rope_force 'rope': tension = -5.0: Expected a number of at least 0",
     ),
     "no tension": (
         lambda: RopeForce(name="rope", path=path_to("rod")),
@@ -136,11 +136,11 @@ NUMBERS = {
     ),
     "rope of one point": (
         lambda: RopeForce(name="rope", path=path_to("rod")[:1], tension=1.0),
-        r"rope_force 'rope': path = .*at least 2 items",
+        r"rope_force 'rope': path = .*Expected at least 2 items, got 1",
     ),
     "negative tendon": (
         lambda: muscle(tendon_slack_length=-0.1),
-        r"thelen_muscle 'biceps': tendon_slack_length = -0.1: should be greater than 0",
+        r"thelen_muscle 'biceps': tendon_slack_length = -0.1: Expected a number above 0",
     ),
     "times that fall": (
         lambda: Steps(times=(0.0, 2.0, 1.0), values=(0.0, 1.0, 2.0)),
@@ -148,7 +148,7 @@ NUMBERS = {
     ),
     "a NaN among values": (
         lambda: Lines(times=(0.0, 1.0), values=(0.0, math.nan)),
-        r"values.1 = nan: should be a finite number",
+        r"values.1 = nan: Expected a finite number",
     ),
     "values missing": (
         lambda: Input(name="u", signal=Steps(times=(0.0, 1.0), values=(1.0,))),

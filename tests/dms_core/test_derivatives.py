@@ -7,7 +7,10 @@ both) each kernel must
 - write derivatives equal to central differences of its own values,
 - write exactly 0 outside its declared pattern,
 - give the same values at level 0 as at level 1, and write no derivative at level 0,
-- let inputs enter a constraint additively.
+- let inputs enter a constraint additively, and sensors by their values only,
+
+and each dynamic element that reads inputs must have an `input_kernel` that gives its derivatives by them; what a
+`parameter_kernel` gives must be the derivatives by all numbers.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import numpy as np
 import pytest
 
 import dms_core.model
+from dms_core.compiled.entries import derivative_kernel
 from dms_core.model.element import Constraint, DynamicElement, Sensor
 from tests.example_elements import composites, examples
 from tests.example_elements.kernel_call import KernelCall, kernel_calls
@@ -119,6 +123,37 @@ def assert_sensor(call: KernelCall, x) -> None:
         return call(x._replace(u=np.column_stack([values, x.u[:, 1:]])), 0)[0]
 
     assert_derivative("Yu", Yu, of_values, x.u[:, 0].copy(), ones(len(x.u)))
+    np.testing.assert_array_equal(call(x._replace(u=x.u * [1.0, 3.0, -2.0]), 0)[0], call(x, 0)[0])
+
+
+def assert_input_kernel(call: KernelCall, x) -> None:
+    """Ju is the derivative of r by value, rate and second derivative of every input."""
+    Ju = call.slopes(x, "input_kernel")
+    assert Ju is not None, f"{call.example.element.kind} reads inputs and has no input_kernel"
+    numeric_shape = (call.placement.size, len(x.u) * 3)
+    assert_derivative(
+        "Ju", Ju.reshape(numeric_shape), lambda u: call(x._replace(u=u.reshape(-1, 3)), 0)[0], x.u.ravel(),
+        np.ones(x.u.size),
+    )  # fmt: skip
+
+
+def assert_parameter_kernel(call: KernelCall, x) -> None:
+    """Jp is the derivative of r by every number."""
+    numbers = np.array(call.placement.numbers, float)
+    by = np.where(numbers == 0.0, 1.0, np.abs(numbers))
+    Jp = call.slopes(x, "parameter_kernel")
+    assert_derivative("Jp", Jp, lambda par: call.with_numbers(par)(x, 0)[0], numbers, by)
+
+
+def assert_constraint_by_input(call: KernelCall, x) -> None:
+    """What a constraint writes into phi_t at the rate 1 of one input is its derivative by that input."""
+    unit = [np.array([[v, float(k == m), 0.0] for m, v in enumerate(x.u[:, 0])]) for k in range(len(x.u))]
+    told = np.stack([call(x._replace(u=u), 0)[1][:, 0] for u in unit], axis=-1)
+
+    def of_values(values: np.ndarray) -> np.ndarray:
+        return call(x._replace(u=np.column_stack([values, x.u[:, 1:]])), 0)[0]
+
+    assert_derivative("phi_u", told, of_values, x.u[:, 0].copy(), np.ones(len(x.u)))
 
 
 def check(call: KernelCall, x) -> None:
@@ -138,6 +173,15 @@ def test_every_kind_has_an_example(kind):
         assert type(function().element) is CONCRETE[kind], f"{function.__name__} is no example of '{kind}'"
 
 
+@pytest.mark.parametrize("kind", sorted(k for k, c in CONCRETE.items() if issubclass(c, DynamicElement)))
+def test_what_can_read_inputs_gives_derivatives_by_them(kind):
+    """By the declaration, so that an element whose examples read none does not escape."""
+    cls = CONCRETE[kind]
+    if cls.input_names is not DynamicElement.input_names:
+        assert derivative_kernel(cls, "input_kernel") is not None, f"'{kind}' can read inputs and has no input_kernel"
+        assert any(call.placement.inputs for f in examples()[kind] for call in kernel_calls(f())), kind
+
+
 def test_every_example_is_of_a_known_kind():
     assert not (examples().keys() | composites().keys()) - CONCRETE.keys()
 
@@ -148,6 +192,20 @@ class TestKernel:
         for call in kernel_calls(example()):
             for seed in SEEDS:
                 check(call, call.random_point(seed))
+
+    def test_derivatives_by_inputs_are_differences(self, example):
+        for call in kernel_calls(example()):
+            if call.placement.inputs and call.branch is not Sensor:
+                for seed in SEEDS:
+                    (assert_input_kernel if call.branch is DynamicElement else assert_constraint_by_input)(
+                        call, call.random_point(seed)
+                    )
+
+    def test_derivatives_by_numbers_are_differences(self, example):
+        for call in kernel_calls(example()):
+            if call.slopes(call.random_point(0), "parameter_kernel") is not None:
+                for seed in SEEDS:
+                    assert_parameter_kernel(call, call.random_point(seed))
 
     def test_nothing_outside_the_pattern(self, example):
         for call in kernel_calls(example()):
@@ -191,3 +249,25 @@ def test_a_wrong_derivative_is_found(kind, output):
     check(call, x)
     with pytest.raises(AssertionError):
         check(_spoiled(call, output), x)
+
+
+@pytest.mark.parametrize(
+    ("kind", "attribute", "confirm"),
+    [
+        ("reference_filter", "input_kernel", assert_input_kernel),
+        ("gravity", "parameter_kernel", assert_parameter_kernel),
+    ],
+)
+def test_a_wrong_derivative_by_input_or_number_is_found(kind, attribute, confirm, monkeypatch):
+    call = kernel_calls(examples()[kind][0]())[0]
+    x = call.random_point(0)
+    confirm(call, x)
+    right = getattr(type(call.example.element), attribute)
+
+    def wrong(*arguments: object) -> None:
+        right(*arguments)
+        arguments[-1][...] *= 1.0 + 1e-5
+
+    monkeypatch.setattr(type(call.example.element), attribute, wrong)
+    with pytest.raises(AssertionError):
+        confirm(call, x)

@@ -143,7 +143,7 @@ MISTAKES = {
     "missing key": (ROD.replace("mass: 1.0, ", ""), r"line 2: rigid_body 'rod': 'mass' is missing"),
     "wrong type": (
         ROD.replace("mass: 1.0", "mass: heavy"),
-        r"rigid_body 'rod': mass = 'heavy': should be a valid number",
+        r"rigid_body 'rod': mass = 'heavy': Expected a number",
     ),
     "wrong part": (
         ROD + "forces:\n  - {kind: rope_force, name: r, tension: 1, path: [{point: [0, 0, 0]}, {bdy: rod}]}\n",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from dms_core.compiled.entries import derivative_kernel
 from dms_core.model.element import Constraint, Declaration, DynamicElement, Placement, Sensor
 from tests.example_elements import Example, Range
 
@@ -50,6 +52,21 @@ class KernelCall(NamedTuple):
         }[self.branch]
         self.kernel(ip, par, *state, level, *out)
         return out
+
+    def slopes(self, x: Point, attribute: str) -> np.ndarray | None:
+        """What the element's `input_kernel`, (n, k, 3), or `parameter_kernel`, (n, n_par), writes; None without it."""
+        kernel = derivative_kernel(type(self.example.element), attribute) if self.branch is DynamicElement else None
+        if kernel is None:
+            return None
+        p = self.placement
+        shape = (p.size, len(p.inputs), 3) if attribute == "input_kernel" else (p.size, len(p.numbers))
+        out = np.zeros(shape)
+        kernel(np.array(p.integers, np.int32), np.array(p.numbers, float), x.q, x.v, x.a, x.u, out)
+        return out
+
+    def with_numbers(self, numbers: np.ndarray) -> KernelCall:
+        """The same call with other numbers."""
+        return self._replace(placement=replace(self.placement, numbers=tuple(numbers)))
 
     @property
     def outputs(self) -> int:

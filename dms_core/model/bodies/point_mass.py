@@ -20,11 +20,19 @@ def point_mass(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
             Ja[i, i] += par[0]
 
 
+@compiled
+def point_mass_by_parameter(ip, par, q, v, a, u, Jp):
+    """The rows by the mass."""
+    for i in range(3):
+        Jp[i, 0] = a[i]
+
+
 class PointMass(Body):
     """A mass without extension. Its axes stay parallel to the ground's: its Euler parameters are constant."""
 
     kind: ClassVar[str] = "point_mass"
     kernel: ClassVar = point_mass
+    parameter_kernel: ClassVar = point_mass_by_parameter
     rigid: ClassVar[bool] = False
     mass: float = Field(gt=0.0, description="mass [kg]")
     position: Vector = Field(default=(0.0, 0.0, 0.0), description="at the start, ground axes [m]")

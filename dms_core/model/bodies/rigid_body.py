@@ -8,7 +8,7 @@ Inertia terms of M vdot - f_v, with omega = 2 G(p) pdot and J about the centre o
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -17,6 +17,23 @@ from dms_core.compiled.jit import compiled
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
 from dms_core.model.geometry.frames import g_matrix, rotation_matrix
 from dms_core.model.geometry.rotations import euler_parameters
+
+
+class RigidNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    mass: int = 0
+    """[kg]"""
+    xx: int = 1
+    """Inertia about the centre of mass [kg m^2], and so the next five."""
+    yy: int = 2
+    zz: int = 3
+    xy: int = 4
+    xz: int = 5
+    yz: int = 6
+
+
+RIGID = RigidNumbers()
 
 
 @compiled
@@ -42,18 +59,18 @@ def _gt_times(p, w):
 
 @compiled
 def _inertia_times(par, w):
-    """J w with J = [xx, yy, zz, xy, xz, yz] in par[1:7]."""
+    """J w."""
     return (
-        par[1] * w[0] + par[4] * w[1] + par[5] * w[2],
-        par[4] * w[0] + par[2] * w[1] + par[6] * w[2],
-        par[5] * w[0] + par[6] * w[1] + par[3] * w[2],
+        par[RIGID.xx] * w[0] + par[RIGID.xy] * w[1] + par[RIGID.xz] * w[2],
+        par[RIGID.xy] * w[0] + par[RIGID.yy] * w[1] + par[RIGID.yz] * w[2],
+        par[RIGID.xz] * w[0] + par[RIGID.yz] * w[1] + par[RIGID.zz] * w[2],
     )
 
 
 @compiled
 def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """M vdot - f_v of one body."""
-    m = par[0]
+    m = par[RIGID.mass]
     p, pd, pdd = euler_parameters(q, 0), euler_parameters(v, 0), euler_parameters(a, 0)
     for i in range(3):
         r[i] += m * a[i]
@@ -77,6 +94,17 @@ def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jv[3 + i, 3 + k] += 8.0 * (dv1[i] + dv2[i])
 
 
+@compiled(makes_arrays=True)
+def rigid_body_by_parameter(ip, par, q, v, a, u, Jp):
+    """The rows by mass and inertia, in which they are linear: those of each number 1 with all others 0."""
+    for k in range(7):
+        one, column, unused = np.zeros(7), np.zeros(7), np.zeros((1, 1))
+        one[k] = 1.0
+        rigid_body(ip, one, q, v, a, u, 0, column, unused, unused, unused)
+        for i in range(7):
+            Jp[i, k] = column[i]
+
+
 class RigidBody(Body):
     """A rigid body. Attachment points elsewhere are given in its reference frame.
 
@@ -86,6 +114,7 @@ class RigidBody(Body):
 
     kind: ClassVar[str] = "rigid_body"
     kernel: ClassVar = rigid_body
+    parameter_kernel: ClassVar = rigid_body_by_parameter
     mass: float = Field(gt=0.0, description="mass [kg]")
     inertia: tuple[float, ...] = Field(
         description="about the centre of mass, in reference axes [kg m^2]: (xx, yy, zz) or (xx, yy, zz, xy, xz, yz)"

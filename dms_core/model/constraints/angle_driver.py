@@ -17,6 +17,7 @@ from dms_core.model.constraints.primitives import joint_pattern
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Constraint, Placement, Vector
 from dms_core.model.geometry.angle import (
+    ANGLE,
     add_angle_gradient,
     add_angle_hessian,
     add_angle_rate_gradient,
@@ -29,7 +30,7 @@ from dms_core.model.geometry.rotations import vec
 @compiled
 def angle_driver(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """par: f, g, h of the angle."""
-    f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)
+    f, g, h = vec(par, ANGLE.f), vec(par, ANGLE.g), vec(par, ANGLE.h)
     turn = 2.0 * math.pi
     error = joint_angle(0, 7, f, g, h, q) - u[0, 0]
     # theta jumps by a turn at +-pi, the input does not: the error is the short way round.

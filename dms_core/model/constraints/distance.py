@@ -7,7 +7,7 @@ Near the solution this is |d| - L, but smooth everywhere; its multiplier is the 
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -23,12 +23,25 @@ from dms_core.model.geometry.separation import (
     separation_pattern,
     separation_rate_gradient,
 )
+from dms_core.model.places import numbers_at
+
+
+class RodNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    length: int = 6
+
+
+ROD = RodNumbers()
 
 
 @compiled
 def distance(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, L."""
-    s_i, s_j, length = vec(par, 0), vec(par, 3), par[6]
+    """The equation and its derivatives."""
+    s_i, s_j, length = vec(par, ROD.s_i), vec(par, ROD.s_j), par[ROD.length]
     d = separation(s_i, s_j, q)
     phi[0] = 0.5 * (dot(d, d) / length - length)
     g = separation_gradient(s_i, s_j, q, d)
@@ -45,6 +58,7 @@ class Distance(Constraint):
     """Rod without mass between two points, with a ball joint at each end."""
 
     kind: ClassVar[str] = "distance"
+    own_points: ClassVar = (ROD.s_i, ROD.s_j)
     kernel: ClassVar = distance
     body_i: str = Field(default=GROUND, description="first body, or 'ground'")
     body_j: str = Field(description="second body")
@@ -69,4 +83,5 @@ class Distance(Constraint):
         s_i, s_j = system.arm(self.body_i, self.point_i), system.arm(self.body_j, self.point_j)
         row, H = separation_pattern(s_i, s_j)
         pattern = ConstraintPattern(row[None, :], row[None, :], H)
-        return Placement(bodies=(self.body_i, self.body_j), numbers=(*s_i, *s_j, length), pattern=pattern)
+        numbers = numbers_at(ROD, s_i=s_i, s_j=s_j, length=length)
+        return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=pattern)

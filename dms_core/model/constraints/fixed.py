@@ -8,7 +8,7 @@ x, y, z are the axes of body i and x', y', z' those directions of body j that co
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,20 +18,35 @@ from dms_core.model.constraints.primitives import UNIT, coincidence, dot1, joint
 from dms_core.model.constraints.relative_pose import joint_arms, relative_rotation
 from dms_core.model.element import GROUND, Constraint, Placement, Quaternion, Vector
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class WeldNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    axes: int = 6
+    """Directions x', y', z' of the second body, nine numbers."""
+
+
+WELD = WeldNumbers()
 
 
 @compiled
 def fixed(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, x', y', z'."""
-    coincidence(0, 0, 7, vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+    """The equations and their derivatives."""
+    coincidence(0, 0, 7, vec(par, WELD.s_i), vec(par, WELD.s_j), q, v, lam, level, phi, G, W, H)
     for k in range(3):
-        dot1(3 + k, 0, 7, UNIT[k], vec(par, 6 + 3 * ((k + 1) % 3)), 0.0, q, v, lam, level, phi, G, W, H)
+        dot1(3 + k, 0, 7, UNIT[k], vec(par, WELD.axes + 3 * ((k + 1) % 3)), 0.0, q, v, lam, level, phi, G, W, H)
 
 
 class Fixed(Constraint):
     """Weld of body_j to body_i. What is not given is taken from the declared start poses."""
 
     kind: ClassVar[str] = "fixed"
+    own_points: ClassVar = (WELD.s_i, WELD.s_j)
     kernel: ClassVar = fixed
     body_i: str = Field(default=GROUND, description="first body, or 'ground'")
     body_j: str = Field(description="second body")
@@ -47,11 +62,16 @@ class Fixed(Constraint):
 
     def aligned(self, numbers) -> tuple[np.ndarray, np.ndarray]:
         """Axes of body_i and the directions of body_j that coincide with them, as rows, shapes (3, 3)."""
-        return np.eye(3), np.reshape(numbers[6:15], (3, 3))
+        return np.eye(3), np.reshape(numbers[WELD.axes : WELD.axes + 9], (3, 3))
+
+    def welded(self) -> tuple[str, ...]:
+        """Both bodies."""
+        return (self.body_i, self.body_j)
 
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
         R = relative_rotation(system, f"fixed '{self.name}'", self.body_i, self.body_j, self.orientation)
         # Row k of R is axis k of body_i, seen from body_j.
-        numbers = np.concatenate([joint_arms(system, self), R.ravel()])
-        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("ccc111"))
+        s_i, s_j = joint_arms(system, self)
+        numbers = numbers_at(WELD, s_i=s_i, s_j=s_j, axes=R)
+        return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("ccc111"))

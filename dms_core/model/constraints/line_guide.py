@@ -7,7 +7,7 @@ Its multipliers are the forces along f and g [N]: lam (f, g) acts on body_i, -la
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,19 +18,35 @@ from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.geometry.frames import perpendicular, unit
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class LineNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    across: int = 6
+    """Directions f, g across the line in the first body, six numbers."""
+
+
+LINE = LineNumbers()
 
 
 @compiled
 def line_guide(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, f, g."""
+    """The equations and their derivatives."""
     for k in range(2):
-        dot2(k, 0, 7, vec(par, 6 + 3 * k), vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+        a, s_i, s_j = vec(par, LINE.across + 3 * k), vec(par, LINE.s_i), vec(par, LINE.s_j)
+        dot2(k, 0, 7, a, s_i, s_j, q, v, lam, level, phi, G, W, H)
 
 
 class LineGuide(Constraint):
     """point_j of body_j stays on the line through point_i of body_i along axis_i."""
 
     kind: ClassVar[str] = "line_guide"
+    own_points: ClassVar = (LINE.s_i, LINE.s_j)
     kernel: ClassVar = line_guide
     body_i: str = Field(default=GROUND, description="body that carries the line, or 'ground'")
     body_j: str = Field(description="body whose point stays on it")
@@ -48,5 +64,6 @@ class LineGuide(Constraint):
         """Both bodies; points relative to their centres of mass."""
         axis = unit(self.axis_i, f"line_guide '{self.name}': axis_i")
         f = perpendicular(axis)
-        numbers = np.concatenate([joint_arms(system, self), f, np.cross(axis, f)])
-        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("22"))
+        s_i, s_j = joint_arms(system, self)
+        numbers = numbers_at(LINE, s_i=s_i, s_j=s_j, across=[f, np.cross(axis, f)])
+        return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("22"))

@@ -9,7 +9,7 @@ and tilt, so a loop over coincident axes keeps full rank. The stronger guides ar
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -19,12 +19,27 @@ from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.geometry.frames import unit
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class PlaneNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    normal: int = 6
+    """In the first body."""
+
+
+PLANE = PlaneNumbers()
 
 
 @compiled
 def plane_guide(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, n."""
-    dot2(0, 0, 7, vec(par, 6), vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+    """The equation and its derivatives."""
+    n, s_i, s_j = vec(par, PLANE.normal), vec(par, PLANE.s_i), vec(par, PLANE.s_j)
+    dot2(0, 0, 7, n, s_i, s_j, q, v, lam, level, phi, G, W, H)
 
 
 class PlaneGuide(Constraint):
@@ -34,6 +49,7 @@ class PlaneGuide(Constraint):
     """
 
     kind: ClassVar[str] = "plane_guide"
+    own_points: ClassVar = (PLANE.s_i, PLANE.s_j)
     kernel: ClassVar = plane_guide
     body_i: str = Field(default=GROUND, description="body that carries the plane, or 'ground'")
     body_j: str = Field(description="body whose point stays in it")
@@ -50,5 +66,6 @@ class PlaneGuide(Constraint):
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
         normal = unit(self.normal_i, f"plane_guide '{self.name}': normal_i")
-        numbers = (*joint_arms(system, self), *normal)
+        s_i, s_j = joint_arms(system, self)
+        numbers = numbers_at(PLANE, s_i=s_i, s_j=s_j, normal=normal)
         return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("2"))

@@ -7,7 +7,7 @@ Its multiplier is the drive's force along a [N]: lam a acts on body_i, -lam a on
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -16,12 +16,27 @@ from dms_core.model.constraints.primitives import dot2, joint_pattern
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.geometry.frames import unit
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class DriverNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    axis: int = 6
+    """Direction of measurement in the first body."""
+
+
+DRIVER = DriverNumbers()
 
 
 @compiled
 def position_driver(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, a."""
-    dot2(0, 0, 7, vec(par, 6), vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+    """The equation and its derivatives."""
+    axis, s_i, s_j = vec(par, DRIVER.axis), vec(par, DRIVER.s_i), vec(par, DRIVER.s_j)
+    dot2(0, 0, 7, axis, s_i, s_j, q, v, lam, level, phi, G, W, H)
     phi[0] -= u[0, 0]
     phi_t[0, 0] = -u[0, 1]
     phi_t[0, 1] = -u[0, 2]
@@ -31,6 +46,7 @@ class PositionDriver(Constraint):
     """The component along axis_i of the way from point_i to point_j follows an input [m]."""
 
     kind: ClassVar[str] = "position_driver"
+    own_points: ClassVar = (DRIVER.s_i, DRIVER.s_j)
     kernel: ClassVar = position_driver
     body_i: str = Field(default=GROUND, description="body in which the position is measured, or 'ground'")
     body_j: str = Field(description="driven body")
@@ -46,7 +62,8 @@ class PositionDriver(Constraint):
     def place(self, system) -> Placement:
         """Both bodies, the measured direction, the input."""
         axis = unit(self.axis_i, f"position_driver '{self.name}': axis_i")
-        numbers = (*system.arm(self.body_i, self.point_i), *system.arm(self.body_j, self.point_j), *axis)
+        s_i, s_j = system.arm(self.body_i, self.point_i), system.arm(self.body_j, self.point_j)
+        numbers = numbers_at(DRIVER, s_i=s_i, s_j=s_j, axis=axis)
         return Placement(
             bodies=(self.body_i, self.body_j), inputs=(self.input,), numbers=numbers, pattern=joint_pattern("2")
         )

@@ -8,12 +8,12 @@ from dms_core.errors import ModelError
 from dms_core.model.geometry.frames import rotation_matrix
 
 
-def joint_arms(system, joint) -> np.ndarray:
-    """point_i and point_j (by default where point_i starts) from the centres of mass [m], shape (6,)."""
+def joint_arms(system, joint) -> tuple[np.ndarray, np.ndarray]:
+    """point_i and point_j (by default where point_i starts) from the centres of mass [m], shape (3,) each."""
     point_j = joint.point_j
     if point_j is None:
         point_j = system.start_point(joint.body_i, joint.point_i, joint.body_j)
-    return np.concatenate([system.arm(joint.body_i, joint.point_i), system.arm(joint.body_j, point_j)])
+    return system.arm(joint.body_i, joint.point_i), system.arm(joint.body_j, point_j)
 
 
 def relative_rotation(system, who: str, body_i: str, body_j: str, orientation) -> np.ndarray:

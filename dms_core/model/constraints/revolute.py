@@ -6,7 +6,7 @@ r_i + A_i s_i - r_j - A_j s_j = 0                  (3)
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -16,20 +16,38 @@ from dms_core.model.constraints.primitives import coincidence, dot1, joint_patte
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.geometry.frames import perpendicular, unit
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class HingeNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    f_i: int = 6
+    """Directions across the axis in the first body."""
+    g_i: int = 9
+    a_j: int = 12
+    """The axis in the second body."""
+
+
+HINGE = HingeNumbers()
 
 
 @compiled
 def revolute(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, f_i, g_i, a_j."""
-    coincidence(0, 0, 7, vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
-    dot1(3, 0, 7, vec(par, 6), vec(par, 12), 0.0, q, v, lam, level, phi, G, W, H)
-    dot1(4, 0, 7, vec(par, 9), vec(par, 12), 0.0, q, v, lam, level, phi, G, W, H)
+    """The equations and their derivatives."""
+    coincidence(0, 0, 7, vec(par, HINGE.s_i), vec(par, HINGE.s_j), q, v, lam, level, phi, G, W, H)
+    dot1(3, 0, 7, vec(par, HINGE.f_i), vec(par, HINGE.a_j), 0.0, q, v, lam, level, phi, G, W, H)
+    dot1(4, 0, 7, vec(par, HINGE.g_i), vec(par, HINGE.a_j), 0.0, q, v, lam, level, phi, G, W, H)
 
 
 class Revolute(Constraint):
     """Hinge between body_i and body_j. What is not given of body_j is taken from the declared start poses."""
 
     kind: ClassVar[str] = "revolute"
+    own_points: ClassVar = (HINGE.s_i, HINGE.s_j)
     kernel: ClassVar = revolute
     body_i: str = Field(default=GROUND, description="first body, or 'ground'")
     body_j: str = Field(description="second body")
@@ -44,7 +62,8 @@ class Revolute(Constraint):
 
     def aligned(self, numbers) -> tuple[np.ndarray, np.ndarray]:
         """Axis of body_i and that of body_j, which coincide, as rows, shapes (1, 3)."""
-        return np.cross(numbers[6:9], numbers[9:12])[None], np.reshape(numbers[12:15], (1, 3))
+        f, g, a = (np.array(numbers[k : k + 3]) for k in (HINGE.f_i, HINGE.g_i, HINGE.a_j))
+        return np.cross(f, g)[None], a[None]
 
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
@@ -59,5 +78,5 @@ class Revolute(Constraint):
             point_j = system.start_point(self.body_i, self.point_i, self.body_j)
         f = perpendicular(axis_i)
         s_i, s_j = system.arm(self.body_i, self.point_i), system.arm(self.body_j, point_j)
-        numbers = np.concatenate([s_i, s_j, f, np.cross(axis_i, f), axis_j])
-        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("ccc11"))
+        numbers = numbers_at(HINGE, s_i=s_i, s_j=s_j, f_i=f, g_i=np.cross(axis_i, f), a_j=axis_j)
+        return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("ccc11"))

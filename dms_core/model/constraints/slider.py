@@ -8,7 +8,7 @@ f', g', a' are the directions of body j that coincide with f, g, a.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -19,17 +19,33 @@ from dms_core.model.constraints.relative_pose import joint_arms, relative_rotati
 from dms_core.model.element import GROUND, Constraint, Placement, Quaternion, Vector
 from dms_core.model.geometry.frames import perpendicular, unit
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class SliderNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    axes_i: int = 6
+    """Directions f, g, a of the first body, nine numbers."""
+    axes_j: int = 15
+    """Directions f', g', a' of the second body, nine numbers."""
+
+
+SLIDER = SliderNumbers()
 
 
 @compiled
 def slider(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j, f, g, a, f', g', a'."""
-    s_i, s_j = vec(par, 0), vec(par, 3)
+    """The equations and their derivatives."""
+    s_i, s_j = vec(par, SLIDER.s_i), vec(par, SLIDER.s_j)
     for k in range(2):
-        dot2(k, 0, 7, vec(par, 6 + 3 * k), s_i, s_j, q, v, lam, level, phi, G, W, H)
+        dot2(k, 0, 7, vec(par, SLIDER.axes_i + 3 * k), s_i, s_j, q, v, lam, level, phi, G, W, H)
     for k in range(3):
-        b = vec(par, 15 + 3 * ((k + 1) % 3))
-        dot1(2 + k, 0, 7, vec(par, 6 + 3 * k), b, 0.0, q, v, lam, level, phi, G, W, H)
+        b = vec(par, SLIDER.axes_j + 3 * ((k + 1) % 3))
+        dot1(2 + k, 0, 7, vec(par, SLIDER.axes_i + 3 * k), b, 0.0, q, v, lam, level, phi, G, W, H)
 
 
 class Slider(Constraint):
@@ -39,6 +55,7 @@ class Slider(Constraint):
     """
 
     kind: ClassVar[str] = "slider"
+    own_points: ClassVar = (SLIDER.s_i, SLIDER.s_j)
     kernel: ClassVar = slider
     body_i: str = Field(default=GROUND, description="body that carries the axis, or 'ground'")
     body_j: str = Field(description="body that slides")
@@ -58,7 +75,8 @@ class Slider(Constraint):
 
     def aligned(self, numbers) -> tuple[np.ndarray, np.ndarray]:
         """Directions f, g, a of body_i and f', g', a' of body_j that coincide with them, as rows, shapes (3, 3)."""
-        return np.reshape(numbers[6:15], (3, 3)), np.reshape(numbers[15:24], (3, 3))
+        i, j = SLIDER.axes_i, SLIDER.axes_j
+        return np.reshape(numbers[i : i + 9], (3, 3)), np.reshape(numbers[j : j + 9], (3, 3))
 
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
@@ -67,5 +85,6 @@ class Slider(Constraint):
         f = perpendicular(a)
         frame = np.array([f, np.cross(a, f), a])
         R = relative_rotation(system, who, self.body_i, self.body_j, self.orientation)
-        numbers = np.concatenate([joint_arms(system, self), frame.ravel(), (frame @ R).ravel()])
-        return Placement(bodies=(self.body_i, self.body_j), numbers=tuple(numbers), pattern=joint_pattern("22111"))
+        s_i, s_j = joint_arms(system, self)
+        numbers = numbers_at(SLIDER, s_i=s_i, s_j=s_j, axes_i=frame, axes_j=frame @ R)
+        return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("22111"))

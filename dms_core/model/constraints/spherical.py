@@ -7,7 +7,7 @@ Its multipliers are the joint force in ground axes [N]: -lam acts on body_i, lam
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -16,18 +16,31 @@ from dms_core.model.constraints.primitives import coincidence, joint_pattern
 from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.places import numbers_at
+
+
+class BallNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point on each body, from its centre of mass [m]."""
+    s_j: int = 3
+
+
+BALL = BallNumbers()
 
 
 @compiled
 def spherical(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
-    """par: s_i, s_j."""
-    coincidence(0, 0, 7, vec(par, 0), vec(par, 3), q, v, lam, level, phi, G, W, H)
+    """The equations and their derivatives."""
+    coincidence(0, 0, 7, vec(par, BALL.s_i), vec(par, BALL.s_j), q, v, lam, level, phi, G, W, H)
 
 
 class Spherical(Constraint):
     """Ball joint between body_i and body_j; point_j is taken from the declared start poses where it is not given."""
 
     kind: ClassVar[str] = "spherical"
+    own_points: ClassVar = (BALL.s_i, BALL.s_j)
     kernel: ClassVar = spherical
     body_i: str = Field(default=GROUND, description="first body, or 'ground'")
     body_j: str = Field(description="second body")
@@ -40,5 +53,6 @@ class Spherical(Constraint):
 
     def place(self, system) -> Placement:
         """Both bodies; points relative to their centres of mass."""
-        numbers = tuple(joint_arms(system, self))
+        s_i, s_j = joint_arms(system, self)
+        numbers = numbers_at(BALL, s_i=s_i, s_j=s_j)
         return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("ccc"))

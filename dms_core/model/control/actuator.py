@@ -23,7 +23,7 @@ is the lag that limits the gain in the Ziegler-Nichols experiment.
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -31,10 +31,28 @@ from pydantic import Field, model_validator
 from dms_core.compiled.jit import compiled
 from dms_core.model.control.pid import Pid
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
+from dms_core.model.places import numbers_at
 
 NOMINAL_TENSION = 100.0
 """Size of a rope drive's tension [N], for the error test: a controller of high gain turns angle errors of 1e-8 rad into
 tenths of a newton, and a tolerance of a newton's fraction would let that ripple dictate the step."""
+
+
+class ActuatorNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    time_constant: int = 0
+    pretension: int = 1
+    limit: int = 2
+    """Largest command beyond the pretension [N]; 0: none."""
+    width: int = 3
+    ki: int = 4
+    """Gains of the PID times the sign."""
+    kp: int = 5
+    kd: int = 6
+
+
+ACTUATOR = ActuatorNumbers()
 
 
 @compiled
@@ -61,8 +79,8 @@ def pulled_tension(x, width, limit):
 
 @compiled
 def rope_actuator(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: from a PID, has authority. par: T, pretension, limit (0: none), width, sign ki, sign kp, sign kd."""
-    T, pretension, limit = par[0], par[1], par[2]
+    """ip: from a PID, has authority."""
+    T, pretension, limit = par[ACTUATOR.time_constant], par[ACTUATOR.pretension], par[ACTUATOR.limit]
     tension = 0.0
     if ip[0] == 0:
         # An input is no unknown of Newton's method: it is clipped without smoothing, so that 0 means 0.
@@ -71,16 +89,28 @@ def rope_actuator(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
             tension = min(tension, limit)
     else:
         authority = u[0, 0] if ip[1] > 0 else 1.0
-        x = authority * (par[4] * q[1] + par[5] * v[1] + par[6] * a[1])
-        tension, slope = pulled_tension(x, par[3], limit)
+        x = authority * (par[ACTUATOR.ki] * q[1] + par[ACTUATOR.kp] * v[1] + par[ACTUATOR.kd] * a[1])
+        tension, slope = pulled_tension(x, par[ACTUATOR.width], limit)
         if level > 0:
-            Jq[0, 1] = -slope * authority * par[4]
-            Jv[0, 1] = -slope * authority * par[5]
-            Ja[0, 1] = -slope * authority * par[6]
+            Jq[0, 1] = -slope * authority * par[ACTUATOR.ki]
+            Jv[0, 1] = -slope * authority * par[ACTUATOR.kp]
+            Ja[0, 1] = -slope * authority * par[ACTUATOR.kd]
     r[0] = T * v[0] + q[0] - pretension - tension
     if level > 0:
         Jq[0, 0] = 1.0
         Jv[0, 0] = T
+
+
+@compiled
+def rope_actuator_by_input(ip, par, q, v, a, u, Ju):
+    """The row by the command or the authority; a command outside its limits moves nothing."""
+    limit = par[ACTUATOR.limit]
+    if ip[0] == 0:
+        inside = u[0, 0] > 0.0 and (limit <= 0.0 or u[0, 0] < limit)
+        Ju[0, 0, 0] = -1.0 if inside else 0.0
+    elif ip[1] > 0:
+        command = par[ACTUATOR.ki] * q[1] + par[ACTUATOR.kp] * v[1] + par[ACTUATOR.kd] * a[1]
+        Ju[0, 0, 0] = -pulled_tension(u[0, 0] * command, par[ACTUATOR.width], limit)[1] * command
 
 
 class RopeActuator(Force):
@@ -91,6 +121,7 @@ class RopeActuator(Force):
 
     kind: ClassVar[str] = "rope_actuator"
     kernel: ClassVar = rope_actuator
+    input_kernel: ClassVar = rope_actuator_by_input
     command: str | None = Field(default=None, description="name of the input that commands a tension [N]")
     pid: str | None = Field(default=None, description="name of the PID controller that commands the tension")
     sign: Literal[1, -1] = Field(
@@ -134,12 +165,11 @@ class RopeActuator(Force):
         """The tension, and the PID's coordinate with its gains."""
         limit = 0.0 if self.max_tension is None else self.max_tension - self.pretension
         own = f"{self.name}.tension"
-        common = (self.time_constant, self.pretension, limit, self.width)
         flags = (int(self.pid is not None), int(self.authority is not None))
         if self.pid is None:
             one = np.ones((1, 1), bool)
             pattern = Pattern(one, one, ~one)
-            return Placement((), (own,), self.input_names(), flags, (*common, 0.0, 0.0, 0.0), pattern)
+            return Placement((), (own,), self.input_names(), flags, self._numbers(limit, 0.0, 0.0, 0.0), pattern)
         gains = system.element(self.pid, Pid)
         row = np.array([[True, True], [False, False]])
         pattern = Pattern(row, row, np.array([[False, gains.kd > 0.0], [False, False]]))
@@ -147,9 +177,15 @@ class RopeActuator(Force):
             coordinates=(own, f"{self.pid}.error_integral"),
             inputs=self.input_names(),
             integers=flags,
-            numbers=(*common, self.sign * gains.ki, self.sign * gains.kp, self.sign * gains.kd),
+            numbers=self._numbers(limit, gains.ki, gains.kp, gains.kd),
             pattern=pattern,
         )
+
+    def _numbers(self, limit: float, ki: float, kp: float, kd: float) -> tuple[float, ...]:
+        return numbers_at(
+            ACTUATOR, time_constant=self.time_constant, pretension=self.pretension, limit=limit, width=self.width,
+            ki=self.sign * ki, kp=self.sign * kp, kd=self.sign * kd,
+        )  # fmt: skip
 
     def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
         """Start of each owned coordinate: the tension, without change.

@@ -11,7 +11,7 @@ chain trick). Muscles read x_n as '<name>.error'.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -21,15 +21,30 @@ from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
 from dms_core.model.geometry.angle import add_angle_gradient, joint_angle
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.geometry.sensed_angle import sensed_angle
+from dms_core.model.places import numbers_at
 
 OWN = 14
 """Local coordinates: two bodies, then the states of the chain from first to last."""
 
 
+class DelayNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    f: int = 0
+    """Frame of the angle, see dms_core.model.geometry.angle."""
+    g: int = 3
+    h: int = 6
+    lag: int = 9
+    """Time constant of one lag [s]."""
+
+
+DELAY = DelayNumbers()
+
+
 @compiled
 def delayed_error(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: number of lags. par: f, g, h of the joint angle, time constant of one lag [s]."""
-    f, g, h, lag = vec(par, 0), vec(par, 3), vec(par, 6), par[9]
+    """ip: number of lags."""
+    f, g, h, lag = vec(par, DELAY.f), vec(par, DELAY.g), vec(par, DELAY.h), par[DELAY.lag]
     source = u[0, 0] - joint_angle(0, 7, f, g, h, q)
     for k in range(OWN, OWN + ip[0]):
         r[k] = lag * v[k] + q[k] - source
@@ -43,11 +58,18 @@ def delayed_error(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jq[k, k - 1] = -1.0
 
 
+@compiled
+def delayed_error_by_input(ip, par, q, v, a, u, Ju):
+    """The row of the first lag by the reference: -1."""
+    Ju[OWN, 0, 0] = -1.0
+
+
 class DelayedError(Force):
     """Delayed error of a revolute joint's angle against a reference. It exerts no force."""
 
     kind: ClassVar[str] = "delayed_error"
     kernel: ClassVar = delayed_error
+    input_kernel: ClassVar = delayed_error_by_input
     joint: str = Field(description="name of the revolute joint whose angle theta is sensed")
     reference: str = Field(description="name of the input psi(t) [rad]")
     delay: float = Field(gt=0.0, description="mean delay D [s]")
@@ -76,7 +98,7 @@ class DelayedError(Force):
             coordinates=tuple(f"{self.name}.{c.name}" for c in self.coordinates()),
             inputs=self.input_names(),
             integers=(self.lags,),
-            numbers=(*frame, self.delay / self.lags),
+            numbers=numbers_at(DELAY, f=frame[:3], g=frame[3:6], h=frame[6:], lag=self.delay / self.lags),
             pattern=_pattern(self.lags),
         )
 

@@ -18,7 +18,7 @@ drift feedback a joint may turn further, since only theta_q enters.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -29,15 +29,30 @@ from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
 from dms_core.model.geometry.angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.geometry.sensed_angle import sensed_angle
+from dms_core.model.places import numbers_at
 
 OWN, FILTER = 14, 15
 """Local coordinates: two bodies, then q_c, then q_f if there is one."""
 
 
+class PidNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    f: int = 0
+    """Frame of the angle, see dms_core.model.geometry.angle."""
+    g: int = 3
+    h: int = 6
+    drift_gain: int = 9
+    """[1/s]"""
+
+
+PID = PidNumbers()
+
+
 @compiled
 def pid(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: has reference, has filter. par: f, g, h of the joint angle, drift gain [1/s]."""
-    f, g, h, drift_gain = vec(par, 0), vec(par, 3), vec(par, 6), par[9]
+    """ip: has reference, has filter."""
+    f, g, h, drift_gain = vec(par, PID.f), vec(par, PID.g), vec(par, PID.h), par[PID.drift_gain]
     psi, psi_rate = 0.0, 0.0
     if ip[0] > 0:
         psi, psi_rate = u[0, 0], u[0, 1]
@@ -57,6 +72,14 @@ def pid(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
             Jv[OWN, FILTER] = -1.0
 
 
+@compiled
+def pid_by_input(ip, par, q, v, a, u, Ju):
+    """The row by psi and psidot."""
+    if ip[0] > 0:
+        Ju[OWN, 0, 0] = -par[PID.drift_gain]
+        Ju[OWN, 0, 1] = -1.0
+
+
 class Pid(Force):
     """PID controller of the angle of a revolute joint. It exerts no force; actuators read its command.
 
@@ -65,6 +88,7 @@ class Pid(Force):
 
     kind: ClassVar[str] = "pid"
     kernel: ClassVar = pid
+    input_kernel: ClassVar = pid_by_input
     joint: str = Field(description="name of the revolute joint whose angle theta is controlled")
     reference: str | None = Field(default=None, description="name of the input psi(t) [rad]; None means 0")
     offset: str | None = Field(
@@ -107,7 +131,7 @@ class Pid(Force):
             coordinates=(own,) if self.offset is None else (own, self.offset),
             inputs=self.input_names(),
             integers=(int(self.reference is not None), int(self.offset is not None)),
-            numbers=(*frame, self.drift_gain),
+            numbers=numbers_at(PID, f=frame[:3], g=frame[3:6], h=frame[6:], drift_gain=self.drift_gain),
             pattern=_pattern(self.offset is not None, self.drift_gain > 0.0),
         )
 

@@ -30,11 +30,27 @@ def reference_filter(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         Ja[0, 0] = 1.0
 
 
+@compiled
+def reference_filter_by_input(ip, par, q, v, a, u, Ju):
+    """The row by s: -w^2."""
+    Ju[0, 0, 0] = -par[0] * par[0]
+
+
+@compiled
+def reference_filter_by_parameter(ip, par, q, v, a, u, Jp):
+    """The row by w and zeta."""
+    w, zeta = par[0], par[1]
+    Jp[0, 0] = 2.0 * zeta * v[0] + 2.0 * w * (q[0] - u[0, 0])
+    Jp[0, 1] = 2.0 * w * v[0]
+
+
 class ReferenceFilter(Force):
     """A smooth setpoint for a controller: owns the coordinate 'setpoint'."""
 
     kind: ClassVar[str] = "reference_filter"
     kernel: ClassVar = reference_filter
+    input_kernel: ClassVar = reference_filter_by_input
+    parameter_kernel: ClassVar = reference_filter_by_parameter
     input: str = Field(description="name of the input s(t) that is filtered [unit of the setpoint]")
     frequency: float = Field(gt=0.0, description="natural angular frequency w [rad/s]")
     damping: float = Field(default=1.0, gt=0.0, description="damping ratio zeta [-]")

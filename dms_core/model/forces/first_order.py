@@ -27,11 +27,27 @@ def first_order(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         Jv[0, 0] += par[0]
 
 
+@compiled
+def first_order_by_input(ip, par, q, v, a, u, Ju):
+    """The row by the input: -g."""
+    Ju[0, 0, 0] = -par[1]
+
+
+@compiled
+def first_order_by_parameter(ip, par, q, v, a, u, Jp):
+    """The row by T and g."""
+    Jp[0, 0] = v[0]
+    if ip[0] == 1:
+        Jp[0, 1] = -u[0, 0]
+
+
 class FirstOrder(Force):
     """A state x that follows g u with the time constant T; without input it decays. Its coordinate is '<name>.x'."""
 
     kind: ClassVar[str] = "first_order"
     kernel: ClassVar = first_order
+    input_kernel: ClassVar = first_order_by_input
+    parameter_kernel: ClassVar = first_order_by_parameter
     time_constant: float = Field(gt=0.0, description="T [s]")
     gain: float = Field(default=1.0, description="g [unit of x per unit of the input]")
     input: str | None = Field(default=None, description="input u; default: u = 0")

@@ -19,11 +19,19 @@ def gravity(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         r[i] -= par[i]
 
 
+@compiled
+def gravity_by_parameter(ip, par, q, v, a, u, Jp):
+    """The rows by m g."""
+    for i in range(3):
+        Jp[i, i] = -1.0
+
+
 class Gravity(Force):
     """Weight of all bodies, or of the named ones."""
 
     kind: ClassVar[str] = "gravity"
     kernel: ClassVar = gravity
+    parameter_kernel: ClassVar = gravity_by_parameter
     acceleration: Vector = Field(
         default=(0.0, -9.80665, 0.0), description="in ground axes [m/s^2]; default: standard gravity, y upwards"
     )

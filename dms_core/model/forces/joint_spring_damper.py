@@ -8,7 +8,7 @@ With stiffness 0 it is the joint's viscous damping.
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -25,6 +25,22 @@ from dms_core.model.geometry.angle import (
     joint_angle,
 )
 from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated, vec
+from dms_core.model.places import numbers_at
+
+
+class JointSpringNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    f: int = 0
+    """Frame of the angle, see dms_core.model.geometry.angle."""
+    g: int = 3
+    h: int = 6
+    stiffness: int = 9
+    damping: int = 10
+    rest_angle: int = 11
+
+
+JOINT_SPRING = JointSpringNumbers()
 
 
 @compiled
@@ -56,10 +72,11 @@ def _angle_rate_gradient(f, g, h, q, v, Jq):
 
 @compiled
 def joint_spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """par: f, g, h of the angle, k, c, theta0."""
-    f, g, h, k, c = vec(par, 0), vec(par, 3), vec(par, 6), par[9], par[10]
+    """Row terms M theta_q^T."""
+    f, g, h = vec(par, JOINT_SPRING.f), vec(par, JOINT_SPRING.g), vec(par, JOINT_SPRING.h)
+    k, c = par[JOINT_SPRING.stiffness], par[JOINT_SPRING.damping]
     turn = 2.0 * math.pi
-    twist = joint_angle(0, 7, f, g, h, q) - par[11]
+    twist = joint_angle(0, 7, f, g, h, q) - par[JOINT_SPRING.rest_angle]
     # theta jumps by a turn at +-pi; the spring is wound the short way round.
     twist -= turn * math.floor(twist / turn + 0.5)
     M = k * twist + c * angle_rate(0, 7, f, g, h, q, v)
@@ -96,6 +113,14 @@ class JointSpringDamper(Force):
         full, none = np.outer(p, p), np.zeros((14, 14), bool)
         return Placement(
             bodies=(joint.body_i, joint.body_j),
-            numbers=(*frame, self.stiffness, self.damping, self.rest_angle),
+            numbers=numbers_at(
+                JOINT_SPRING,
+                f=frame[:3],
+                g=frame[3:6],
+                h=frame[6:],
+                stiffness=self.stiffness,
+                damping=self.damping,
+                rest_angle=self.rest_angle,
+            ),  # fmt: skip
             pattern=Pattern(full, full if self.damping > 0.0 else none, none),
         )

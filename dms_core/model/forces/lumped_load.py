@@ -9,7 +9,7 @@ A load that turns with the body has F = A F_b, and G instead of E: 2 G(p)^T M_b,
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +18,19 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.geometry.rotations import add_hessian, columns, cross, dot, euler_parameters, rotated, vec
+from dms_core.model.places import numbers_at
+
+
+class LoadNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    point: int = 0
+    """From the centre of mass [m]."""
+    force: int = 3
+    moment: int = 6
+
+
+LOAD = LoadNumbers()
 
 
 @compiled
@@ -47,11 +60,11 @@ def _lumped_load_derivatives(q, s, F, F_b, m, sign, factor, follows, Jq):
 
 @compiled
 def lumped_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: load in body axes, load scaled by the input. par: s, F, M."""
+    """ip: load in body axes, load scaled by the input."""
     follows, factor = ip[0] == 1, 1.0
     if ip[1] == 1:
         factor = u[0, 0]
-    s, F_b, m = vec(par, 0), vec(par, 3), vec(par, 6)
+    s, F_b, m = vec(par, LOAD.point), vec(par, LOAD.force), vec(par, LOAD.moment)
     sign = 1.0 if follows else -1.0
     F = rotated(q, 0, F_b) if follows else F_b
     F = (factor * F[0], factor * F[1], factor * F[2])
@@ -64,11 +77,26 @@ def lumped_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         _lumped_load_derivatives(q, s, F, F_b, m, sign, factor, follows, Jq)
 
 
+@compiled
+def lumped_load_by_input(ip, par, q, v, a, u, Ju):
+    """The rows of the body by the factor: the load of factor 1."""
+    s, F, m = vec(par, LOAD.point), vec(par, LOAD.force), vec(par, LOAD.moment)
+    sign = 1.0 if ip[0] == 1 else -1.0
+    if ip[0] == 1:
+        F = rotated(q, 0, F)
+    d, x = columns(q, 0, s), _moment(euler_parameters(q, 0), m, sign)
+    for i in range(3):
+        Ju[i, 0, 0] = -F[i]
+    for n in range(4):
+        Ju[3 + n, 0, 0] = -dot(d[n], F) - 2.0 * x[n]
+
+
 class LumpedLoad(Force):
     """Force and moment on a body, constant or multiplied by an input."""
 
     kind: ClassVar[str] = "lumped_load"
     kernel: ClassVar = lumped_load
+    input_kernel: ClassVar = lumped_load_by_input
     body: str = Field(description="loaded body")
     point: Vector = Field(default=(0.0, 0.0, 0.0), description="point of attack in the frame of the body [m]")
     force: Vector = Field(default=(0.0, 0.0, 0.0), description="force [N]")
@@ -94,6 +122,6 @@ class LumpedLoad(Force):
             bodies=(self.body,),
             inputs=self.input_names(),
             integers=(int(self.axes == "body"), int(self.input is not None)),
-            numbers=(*system.arm(self.body, self.point), *self.force, *self.moment),
+            numbers=numbers_at(LOAD, point=system.arm(self.body, self.point), force=self.force, moment=self.moment),
             pattern=Pattern(jq, none, none),
         )

@@ -7,25 +7,52 @@ With stiffness and damping 0 it integrates g u twice.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement
+from dms_core.model.places import numbers_at
+
+
+class SecondOrderNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    mass: int = 0
+    damping: int = 1
+    stiffness: int = 2
+    gain: int = 3
+
+
+SECOND = SecondOrderNumbers()
 
 
 @compiled
 def second_order(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: has an input. par: m, c, k, g."""
-    r[0] += par[0] * a[0] + par[1] * v[0] + par[2] * q[0]
+    """ip: has an input."""
+    r[0] += par[SECOND.mass] * a[0] + par[SECOND.damping] * v[0] + par[SECOND.stiffness] * q[0]
     if ip[0] == 1:
-        r[0] -= par[3] * u[0, 0]
+        r[0] -= par[SECOND.gain] * u[0, 0]
     if level > 0:
-        Ja[0, 0] += par[0]
-        Jv[0, 0] += par[1]
-        Jq[0, 0] += par[2]
+        Ja[0, 0] += par[SECOND.mass]
+        Jv[0, 0] += par[SECOND.damping]
+        Jq[0, 0] += par[SECOND.stiffness]
+
+
+@compiled
+def second_order_by_input(ip, par, q, v, a, u, Ju):
+    """The row by the input: -g."""
+    Ju[0, 0, 0] = -par[SECOND.gain]
+
+
+@compiled
+def second_order_by_parameter(ip, par, q, v, a, u, Jp):
+    """The row by m, c, k, g."""
+    Jp[0, SECOND.mass], Jp[0, SECOND.damping], Jp[0, SECOND.stiffness] = a[0], v[0], q[0]
+    if ip[0] == 1:
+        Jp[0, SECOND.gain] = -u[0, 0]
 
 
 class SecondOrder(Force):
@@ -33,6 +60,8 @@ class SecondOrder(Force):
 
     kind: ClassVar[str] = "second_order"
     kernel: ClassVar = second_order
+    input_kernel: ClassVar = second_order_by_input
+    parameter_kernel: ClassVar = second_order_by_parameter
     mass: float = Field(default=1.0, gt=0.0, description="m [unit of the row per unit of xddot]")
     damping: float = Field(default=0.0, description="c [unit of the row per unit of xdot]")
     stiffness: float = Field(default=0.0, description="k [unit of the row per unit of x]")
@@ -58,6 +87,6 @@ class SecondOrder(Force):
             coordinates=(f"{self.name}.x",),
             inputs=self.input_names(),
             integers=(int(self.input is not None),),
-            numbers=(self.mass, self.damping, self.stiffness, self.gain),
+            numbers=numbers_at(SECOND, mass=self.mass, damping=self.damping, stiffness=self.stiffness, gain=self.gain),
             pattern=Pattern(one, one, one),
         )

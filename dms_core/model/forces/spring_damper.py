@@ -8,7 +8,7 @@ With e = d.d / 2:  l_q = e_q / l,  l_qq = (e_qq - l_q^T l_q) / l,  (l_q v)_q = (
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -24,20 +24,36 @@ from dms_core.model.geometry.separation import (
     separation_rate,
     separation_rate_gradient,
 )
+from dms_core.model.places import numbers_at
 
 SHORTEST = 1e-9
 """Length below which the direction is not resolved [m]: the force fades to 0 there instead of a division by 0."""
 
 
+class SpringNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """End on each body, from its centre of mass [m]."""
+    s_j: int = 3
+    stiffness: int = 6
+    damping: int = 7
+    free_length: int = 8
+    preload: int = 9
+
+
+SPRING = SpringNumbers()
+
+
 @compiled
 def spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """par: s_i, s_j, k, c, l0, T0."""
-    s_i, s_j, k, c = vec(par, 0), vec(par, 3), par[6], par[7]
+    """Row terms T l_q^T."""
+    s_i, s_j, k, c = vec(par, SPRING.s_i), vec(par, SPRING.s_j), par[SPRING.stiffness], par[SPRING.damping]
     d = separation(s_i, s_j, q)
     length = max(math.sqrt(dot(d, d)), SHORTEST)
     n = scale(1.0 / length, d)
     rate = dot(n, separation_rate(s_i, s_j, q, v))
-    T = k * (length - par[8]) + c * rate + par[9]
+    T = k * (length - par[SPRING.free_length]) + c * rate + par[SPRING.preload]
     g = separation_gradient(s_i, s_j, q, n)
     for i in range(14):
         r[i] += T * g[i]
@@ -77,6 +93,14 @@ class SpringDamper(Force):
         full, none = np.outer(row, row), np.zeros((14, 14), bool)
         return Placement(
             bodies=(self.body_i, self.body_j),
-            numbers=(*s_i, *s_j, self.stiffness, self.damping, length, self.preload),
+            numbers=numbers_at(
+                SPRING,
+                s_i=s_i,
+                s_j=s_j,
+                stiffness=self.stiffness,
+                damping=self.damping,
+                free_length=length,
+                preload=self.preload,
+            ),  # fmt: skip
             pattern=Pattern(full, full if self.damping > 0.0 else none, none),
         )

@@ -12,6 +12,7 @@ theta = 0 where A_j h is along A_i f. Written as theta = Im log(c + i s):
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,17 @@ from dms_core.model.geometry.rotations import (
     scale,
     sub,
 )
+
+
+class AngleNumbers(NamedTuple):
+    """Places of the directions in a table that holds nothing but an angle's frame."""
+
+    f: int = 0
+    g: int = 3
+    h: int = 6
+
+
+ANGLE = AngleNumbers()
 
 LEAST_LEVER = 1e-3
 """Sine of the angle between pointer and axis [-] below which a pointer shows no angle."""

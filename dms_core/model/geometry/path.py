@@ -17,14 +17,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from dms_core.compiled.jit import compiled
-from dms_core.errors import ModelError
-from dms_core.model.element import GROUND, Vector, explain
+from dms_core.errors import DmsError, ModelError
+from dms_core.model.element import GROUND, Vector
 from dms_core.model.geometry.rotations import (
     add_hessian,
     columns,
@@ -37,6 +37,7 @@ from dms_core.model.geometry.rotations import (
     sub,
     vec,
 )
+from dms_core.validation import Checked
 
 SHORTEST = 1e-12
 """Length [m] below which a segment has no direction; keeps the kernels finite where two points meet."""
@@ -170,18 +171,12 @@ def _add_block(H, q, oi, si, oj, sj, w, c):
             H[oi + 3 + m, oj + 3 + n] += dot(ci[m], y)
 
 
-class PathPoint(BaseModel):
+class PathPoint(Checked):
     """One point of a path."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    wrong: ClassVar[type[DmsError]] = ModelError
     body: str = Field(default=GROUND, description="body that carries the point, or 'ground'")
     point: Vector = Field(description="in the reference frame of the body [m]")
-
-    def __init__(self, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise ModelError(explain(type(self), data, error)) from None
 
 
 class PathTable(NamedTuple):

@@ -17,7 +17,7 @@ in closed form the fibre row holds q_m and its rate directly, without an inner i
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -43,25 +43,52 @@ from dms_core.model.muscles.thelen_curves import (
     passive_force,
     tendon_force,
 )
+from dms_core.model.places import numbers_at
 
 LEAST_COSINE = 0.1
 """Pennation is not let beyond acos(0.1), about 84 degrees."""
 MOST_TRIALS = 200
 """Evaluations after which a search for a zero is as good as it gets."""
-PATH_NUMBERS = 15
-"""Index in `par` where the path begins; before it F0, L0, Ls, height, vmax [m/s], tau_act, tau_deact, the seven
-numbers of the curves, then the reflex gain."""
-REFLEX_GAIN = 14
-"""Index of the reflex gain in `par`; 0 without a reflex."""
 PATH_INTEGERS = 2
 """Index in `ip` where the path begins: before it, 1 for activation dynamics (2 with a reflex, 0 where the input is the
 activation), and the number m of body coordinates: q_m is local coordinate m, a is m + 1, a reflex m + 2."""
 
 
+class MuscleNumbers(NamedTuple):
+    """Places of the kernel's numbers; the path's table is the last of them."""
+
+    F0: int = 0
+    L0: int = 1
+    Ls: int = 2
+    height: int = 3
+    """Of the fibre across the tendon, L0 sin(alpha0) [m]."""
+    fastest: int = 4
+    """Contraction velocity [m/s]."""
+    activation_time: int = 5
+    deactivation_time: int = 6
+    """Time constants [s]."""
+    active_shape: int = 7
+    passive_shape: int = 8
+    passive_strain: int = 9
+    toe_strain: int = 10
+    """Tendon strain at the end of the toe [-]."""
+    tendon_slope: int = 11
+    """Slope of the tendon's line behind the toe [-]."""
+    velocity_shape: int = 12
+    lengthening_force: int = 13
+    reflex_gain: int = 14
+    """0 without a reflex."""
+    path: int = 15
+
+
+MUSCLE = MuscleNumbers()
+PATH_NUMBERS = MUSCLE.path
+
+
 @compiled
 def pennation_cosine(par, length):
     """(cos(alpha), its slope by the fibre length [1/m])."""
-    height = par[3]
+    height = par[MUSCLE.height]
     if length <= height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE):
         # A fibre without height is parallel to the tendon at every length, even where Newton's method tries l <= 0.
         return (LEAST_COSINE, 0.0) if height > 0.0 else (1.0, 0.0)
@@ -83,33 +110,34 @@ def muscle_excitation(ip, par, q, u):
     """(excitation [-], its derivative by the reflex coordinate)."""
     if ip[0] < 2:
         return limited(u[0, 0])[0], 0.0
-    e, inside = limited(u[0, 0] + par[REFLEX_GAIN] * q[ip[1] + 2])
-    return e, inside * par[REFLEX_GAIN]
+    e, inside = limited(u[0, 0] + par[MUSCLE.reflex_gain] * q[ip[1] + 2])
+    return e, inside * par[MUSCLE.reflex_gain]
 
 
 @compiled
 def tendon_state(par, length, fibre):
     """(sigma [N], dsigma/dl [N/m], dsigma/dq_m [N/m]) at the given muscle-tendon and fibre lengths."""
     c, c_l = pennation_cosine(par, fibre)
-    ft, ft_e = tendon_force((length - fibre * c) / par[2] - 1.0, par[10], par[11])
-    by_length = par[0] * ft_e / par[2]
-    return par[0] * ft, by_length, -by_length * (c + fibre * c_l)
+    F0, Ls = par[MUSCLE.F0], par[MUSCLE.Ls]
+    ft, ft_e = tendon_force((length - fibre * c) / Ls - 1.0, par[MUSCLE.toe_strain], par[MUSCLE.tendon_slope])
+    by_length = F0 * ft_e / Ls
+    return F0 * ft, by_length, -by_length * (c + fibre * c_l)
 
 
 @compiled
 def fibre_state(par, fibre, rate, a):
     """Active and passive fibre force [N]; derivatives of the active by q_m, its rate and a, of the passive by q_m."""
-    fl, fl_l = active_force(fibre / par[1], par[7])
-    fp, fp_l = passive_force(fibre / par[1], par[8], par[9])
-    fv, fv_w, fv_a = force_velocity(rate / par[4], a, par[12], par[13])
-    F0 = par[0]
+    F0, L0, fastest = par[MUSCLE.F0], par[MUSCLE.L0], par[MUSCLE.fastest]
+    fl, fl_l = active_force(fibre / L0, par[MUSCLE.active_shape])
+    fp, fp_l = passive_force(fibre / L0, par[MUSCLE.passive_shape], par[MUSCLE.passive_strain])
+    fv, fv_w, fv_a = force_velocity(rate / fastest, a, par[MUSCLE.velocity_shape], par[MUSCLE.lengthening_force])
     return (
         F0 * a * fl * fv,
         F0 * fp,
-        F0 * a * fl_l * fv / par[1],
-        F0 * a * fl * fv_w / par[4],
+        F0 * a * fl_l * fv / L0,
+        F0 * a * fl * fv_w / fastest,
         F0 * fl * (fv + a * fv_a),
-        F0 * fp_l / par[1],
+        F0 * fp_l / L0,
     )
 
 
@@ -123,8 +151,8 @@ def surplus(par, length, fibre, a):
 @compiled
 def fibre_at_rest(par, length, a):
     """Fibre length [m] at which `surplus` is 0, to rounding; 0.0 where the tendon leaves no room for it."""
-    height, room = par[3], length - par[2]
-    low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[1]) * (1.0 + 1e-12)
+    height, room = par[MUSCLE.height], length - par[MUSCLE.Ls]
+    low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[MUSCLE.L0]) * (1.0 + 1e-12)
     # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
     high = math.hypot(max(room, 0.0), height)
     if room <= 0.0 or high <= low:
@@ -142,7 +170,7 @@ def fibre_at_rest(par, length, a):
 
 @compiled
 def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """Tables as described at PATH_INTEGERS and PATH_NUMBERS."""
+    """ip as described at PATH_INTEGERS, par as in MuscleNumbers."""
     m = ip[1]
     length = add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, r)
     act, _ = muscle_activation(ip, q, u)
@@ -165,7 +193,9 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     r[m] = (active + passive) * c - sigma
     if ip[0] > 0:
         excitation, by_reflex = muscle_excitation(ip, par, q, u)
-        rate, rate_a, rate_u = activation_rate(act, excitation, par[5], par[6])
+        rate, rate_a, rate_u = activation_rate(
+            act, excitation, par[MUSCLE.activation_time], par[MUSCLE.deactivation_time]
+        )
         r[m + 1] = v[m + 1] - rate
         if level > 0:
             Jq[m + 1, m + 1] = -rate_a
@@ -174,11 +204,27 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jq[m + 1, m + 2] = -rate_u * by_reflex
 
 
+@compiled
+def thelen_muscle_by_input(ip, par, q, v, a, u, Ju):
+    """The activation's row by the excitation; without activation dynamics the fibre's row by the activation."""
+    m = ip[1]
+    act, by_input = muscle_activation(ip, q, u)
+    if ip[0] == 0:
+        by_activation = fibre_state(par, q[m], v[m], act)[4]
+        Ju[m, 0, 0] = by_activation * pennation_cosine(par, q[m])[0] * by_input
+        return
+    wanted = u[0, 0] + par[MUSCLE.reflex_gain] * q[m + 2] if ip[0] > 1 else u[0, 0]
+    excitation, inside = limited(wanted)
+    tau_act, tau_deact = par[MUSCLE.activation_time], par[MUSCLE.deactivation_time]
+    Ju[m + 1, 0, 0] = -activation_rate(act, excitation, tau_act, tau_deact)[2] * inside
+
+
 class ThelenMuscle(Force):
     """One muscle. It owns "fibre_length" and, with activation dynamics, "activation"."""
 
     kind: ClassVar[str] = "thelen_muscle"
     kernel: ClassVar = thelen_muscle
+    input_kernel: ClassVar = thelen_muscle_by_input
     path: tuple[PathPoint, ...] = Field(min_length=2, description="attachment and via points from origin to insertion")
     excitation: str = Field(
         description="name of the input: excitation [-], or the activation itself; limited to 0.01..1"
@@ -254,23 +300,32 @@ class ThelenMuscle(Force):
             coordinates=names,
             inputs=(self.excitation,),
             integers=(int(self.activation_dynamics) + int(self.reflex is not None), table.size, *table.integers),
-            numbers=(*self.numbers(), *table.numbers),
+            numbers=self.numbers(table.numbers),
             pattern=self._pattern(table, table.size + len(names)),
         )
 
-    def numbers(self) -> tuple[float, ...]:
-        """The kernel's table without the path."""
-        L0 = self.optimal_fibre_length
-        return (
-            self.max_isometric_force,
-            L0,
-            self.tendon_slack_length,
-            L0 * math.sin(self.pennation_angle),
-            L0 * self.max_contraction_velocity,
-            self.activation_time_constant,
-            self.deactivation_time_constant,
-            *self.curves.numbers(),
-            self.reflex_gain,
+    def numbers(self, path: tuple[float, ...] = ()) -> tuple[float, ...]:
+        """The kernel's table; without a path it ends before it."""
+        L0, curves = self.optimal_fibre_length, self.curves
+        toe_strain, tendon_slope = curves.toe()
+        return numbers_at(
+            MUSCLE,
+            F0=self.max_isometric_force,
+            L0=L0,
+            Ls=self.tendon_slack_length,
+            height=L0 * math.sin(self.pennation_angle),
+            fastest=L0 * self.max_contraction_velocity,
+            activation_time=self.activation_time_constant,
+            deactivation_time=self.deactivation_time_constant,
+            active_shape=curves.active_shape,
+            passive_shape=curves.passive_shape,
+            passive_strain=curves.passive_strain,
+            toe_strain=toe_strain,
+            tendon_slope=tendon_slope,
+            velocity_shape=curves.velocity_shape,
+            lengthening_force=curves.lengthening_force,
+            reflex_gain=self.reflex_gain,
+            path=path,
         )
 
     @staticmethod

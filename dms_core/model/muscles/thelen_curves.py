@@ -16,13 +16,13 @@ tangent below fv = 0 and above fv = 0.95 Flen, so that it is defined and rising 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from dms_core.compiled.jit import compiled
-from dms_core.errors import ModelError
-from dms_core.model.element import explain
+from dms_core.errors import DmsError, ModelError
+from dms_core.validation import Checked
 
 TOE_FORCE = 0.33
 """Tendon force over F0 where the exponential toe goes over into the straight line."""
@@ -87,10 +87,10 @@ def force_velocity(w, a, af, f_len):
     return f, slope / reach, by_a
 
 
-class ThelenCurves(BaseModel):
+class ThelenCurves(Checked):
     """Shape parameters. The defaults are Thelen's young adult, which are OpenSim's class defaults too."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    wrong: ClassVar[type[DmsError]] = ModelError
     tendon_strain: float = Field(default=0.04, gt=0.0, description="tendon strain e0T at maximum isometric force [-]")
     passive_strain: float = Field(default=0.6, gt=0.0, description="fibre strain e0M at which passive force is F0 [-]")
     active_shape: float = Field(default=0.45, gt=0.0, description="width gamma of the active curve [-]")
@@ -104,12 +104,6 @@ class ThelenCurves(BaseModel):
         description="'exact': toe and line meet with equal slope, ft(e0T) = 1; 'rounded': 0.609 e0T, 1.712/e0T",
     )
 
-    def __init__(self, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise ModelError(explain(type(self), data, error)) from None
-
     def toe(self) -> tuple[float, float]:
         """Strain e_toe [-] at the end of the toe and slope k_lin [-] of the line behind it."""
         if self.tendon_constants == "rounded":
@@ -117,14 +111,3 @@ class ThelenCurves(BaseModel):
         big = math.exp(TOE_SHAPE)
         e_toe = 99.0 * self.tendon_strain * big / (166.0 * big - 67.0)
         return e_toe, 0.67 / (self.tendon_strain - e_toe)
-
-    def numbers(self) -> tuple[float, ...]:
-        """gamma, kPE, e0M, e_toe, k_lin, Af, Flen: the table that the muscle's kernel reads."""
-        return (
-            self.active_shape,
-            self.passive_shape,
-            self.passive_strain,
-            *self.toe(),
-            self.velocity_shape,
-            self.lengthening_force,
-        )

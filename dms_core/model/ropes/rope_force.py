@@ -42,11 +42,22 @@ def rope_force(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         r[k] *= tau
 
 
+@compiled(makes_arrays=True)
+def rope_force_by_input(ip, par, q, v, a, u, Ju):
+    """The rows of the bodies by the tension: l_q^T where the input pulls."""
+    if u[0, 0] > 0.0:
+        gradient = np.zeros(ip[1])
+        add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, gradient)
+        for k in range(ip[1]):
+            Ju[k, 0, 0] = gradient[k]
+
+
 class RopeForce(Force):
     """A massless rope that pulls along its path with a tension from one of three sources."""
 
     kind: ClassVar[str] = "rope_force"
     kernel: ClassVar = rope_force
+    input_kernel: ClassVar = rope_force_by_input
     path: tuple[PathPoint, ...] = Field(min_length=2, description="points in the order of the rope")
     tension: float | None = Field(default=None, ge=0.0, description="constant tension [N]")
     input: str | None = Field(

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
-from dms_core.model.geometry.angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
+from dms_core.model.geometry.angle import ANGLE, add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle
 from dms_core.model.geometry.rotations import (
     add,
     bilinear,
@@ -105,7 +105,7 @@ def add_angle_acceleration_gradient(k, oi, oj, f, g, h, q, v, a, G):
 @compiled
 def joint_angle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """par: f, g, h of dms_core.model.geometry.angle."""
-    f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)
+    f, g, h = vec(par, ANGLE.f), vec(par, ANGLE.g), vec(par, ANGLE.h)
     y[0] = joint_angle(0, 7, f, g, h, q)
     y[1] = angle_rate(0, 7, f, g, h, q, v)
     y[2] = angle_acceleration(0, 7, f, g, h, q, v, a)

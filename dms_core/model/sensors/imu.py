@@ -8,7 +8,7 @@ Navigation Technology).
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -17,9 +17,22 @@ from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
 from dms_core.model.forces.gravity import Gravity
 from dms_core.model.geometry.rotations import add_gradient, dot, euler_parameters, k_times, rotated, sub, vec
+from dms_core.model.places import numbers_at
 from dms_core.model.sensors.point import point_acceleration
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class ImuNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    point: int = 0
+    """From the centre of mass [m]."""
+    gravity: int = 3
+    """In ground axes [m/s^2]."""
+
+
+IMU = ImuNumbers()
 
 
 @compiled
@@ -37,10 +50,10 @@ def _angular_velocity_rows(p, factor, Y):
 
 @compiled
 def imu(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
-    """par: s from the centre of mass, g."""
-    s = vec(par, 0)
+    """Specific force, then angular velocity."""
+    s = vec(par, IMU.point)
     p, pd, pdd = euler_parameters(q, 0), euler_parameters(v, 0), euler_parameters(a, 0)
-    f = sub(point_acceleration(q, v, a, 0, s), vec(par, 3))
+    f = sub(point_acceleration(q, v, a, 0, s), vec(par, IMU.gravity))
     y[3] = 2.0 * (-p[1] * pd[0] + p[0] * pd[1] + p[3] * pd[2] - p[2] * pd[3])
     y[4] = 2.0 * (-p[2] * pd[0] - p[3] * pd[1] + p[0] * pd[2] + p[1] * pd[3])
     y[5] = 2.0 * (-p[3] * pd[0] + p[2] * pd[1] - p[1] * pd[2] + p[0] * pd[3])
@@ -82,4 +95,6 @@ class Imu(Sensor):
         """One body; the point relative to its centre of mass."""
         fields = [force.acceleration for force in system.forces if isinstance(force, Gravity)]
         gravity = self.gravity if self.gravity is not None else np.sum([(0.0, 0.0, 0.0), *fields], axis=0)
-        return Placement(bodies=(self.body,), numbers=(*system.arm(self.body, self.point), *map(float, gravity)))
+        return Placement(
+            bodies=(self.body,), numbers=numbers_at(IMU, point=system.arm(self.body, self.point), gravity=gravity)
+        )

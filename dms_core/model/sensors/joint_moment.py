@@ -10,20 +10,19 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from dms_core.model.constraints.revolute import Revolute
-from dms_core.model.element import DynamicElement, Placement, Sensor
+from dms_core.model.element import COMPOSITIONS, MOMENT, DynamicElement, Placement, Sensor
 from dms_core.model.geometry.frames import unit
-
-JOINT_MOMENT = 2
+from dms_core.model.places import numbers_at
 
 
 class JointMoment(Sensor):
     """Moment [Nm] about a revolute joint with which `elements` act on the distal `bodies`."""
 
     kind: ClassVar[str] = "joint_moment"
+    composition: ClassVar[int] = COMPOSITIONS.joint_moment
     joint: str = Field(description="revolute joint")
     elements: tuple[str, ...] = Field(min_length=1, description="muscles, ropes, springs, ... that are summed")
     bodies: tuple[str, ...] | None = Field(
@@ -43,10 +42,9 @@ class JointMoment(Sensor):
         for name in distal:
             system.body(name)
         axis = unit(joint.axis_i, f"revolute '{joint.name}': axis_i")
-        numbers = np.concatenate([system.arm(joint.body_i, joint.point_i), axis])
+        numbers = numbers_at(MOMENT, centre=system.arm(joint.body_i, joint.point_i), axis=axis)
         return Placement(
             bodies=(joint.body_i, *distal),
-            integers=(JOINT_MOMENT,),
-            numbers=tuple(float(x) for x in numbers),
+            numbers=numbers,
             sources=self.elements,
         )

@@ -16,15 +16,14 @@ from typing import ClassVar
 from pydantic import Field
 
 from dms_core.errors import ModelError, choices
-from dms_core.model.element import GROUND, Constraint, Placement, Sensor, Vector
-
-REACTION = 1
+from dms_core.model.element import COMPOSITIONS, GROUND, Constraint, Placement, Sensor, Vector
 
 
 class JointReaction(Sensor):
     """Force [N] and moment [Nm] that `constraint` exerts on `body` at `point`, in the axes of `frame`."""
 
     kind: ClassVar[str] = "joint_reaction"
+    composition: ClassVar[int] = COMPOSITIONS.reaction
     constraint: str = Field(description="constraint whose reaction is measured")
     body: str = Field(description="body of that constraint on which the reaction acts")
     point: Vector | None = Field(
@@ -38,7 +37,7 @@ class JointReaction(Sensor):
         return tuple((f"{c}{axis}", unit) for c, unit in (("F", "N"), ("M", "Nm")) for axis in "xyz")
 
     def place(self, system) -> Placement:
-        """The constraint's own local coordinates; integers: kind, block of the body, block of the frame or -1."""
+        """The constraint's own local coordinates; integers: see COMPOSITIONS."""
         constraint = system.element(self.constraint, Constraint)
         place = constraint.place(system)
         for what, body in (("body", self.body), ("frame", self.frame)):
@@ -49,23 +48,17 @@ class JointReaction(Sensor):
                 )
         block = place.bodies.index(self.body)
         frame = place.bodies.index(self.frame) if self.frame in place.bodies and self.frame != GROUND else -1
-        arm = (
-            system.arm(self.body, self.point)
-            if self.point is not None
-            else _own_point(constraint, place, block, system)
-        )
+        arm = (0.0, 0.0, 0.0)
+        if self.point is not None:
+            arm = system.arm(self.body, self.point)
+        elif block < len(constraint.own_points):
+            first = constraint.own_points[block]
+            arm = place.numbers[first : first + 3]
         return Placement(
             bodies=place.bodies,
             coordinates=place.coordinates,
             inputs=place.inputs,
-            integers=(REACTION, 7 * block, 7 * frame if frame >= 0 else -1),
+            integers=(7 * block, 7 * frame if frame >= 0 else -1),
             numbers=tuple(float(x) for x in arm),
             constraint=self.constraint,
         )
-
-
-def _own_point(constraint: Constraint, place: Placement, block: int, system) -> tuple[float, ...]:
-    """The joint's point on that body from its centre of mass: joints keep s_i, s_j first among their numbers."""
-    if hasattr(constraint, "point_i") and len(place.numbers) >= 6 and block < 2:
-        return tuple(place.numbers[3 * block : 3 * block + 3])
-    return (0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.control.pid import FILTER, OWN, Pid
+from dms_core.model.control.pid import FILTER, OWN, PID, Pid
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.geometry.angle import add_angle_gradient, joint_angle
 from dms_core.model.geometry.rotations import vec
@@ -21,7 +21,7 @@ from dms_core.model.geometry.rotations import vec
 @compiled
 def tracking(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """ip, par: those of the controller."""
-    f, g, h = vec(par, 0), vec(par, 3), vec(par, 6)
+    f, g, h = vec(par, PID.f), vec(par, PID.g), vec(par, PID.h)
     y[0] = -joint_angle(0, 7, f, g, h, q)
     if ip[0] > 0:
         y[0] += u[0, 0]

@@ -7,20 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from dms_core.assembly.blocks import OperatingPoint
 from dms_core.assembly.model import Model
-from dms_core.assembly.residual import evaluate_inputs, evaluate_newton, evaluate_rates, evaluate_residual
-from dms_core.assembly.sensing import SENSING
-from dms_core.assembly.sparsity import newton_pattern, rate_pattern
-from dms_core.compiled.arena import Packed, inner
-from dms_core.errors import AssemblyError, ModelError
+from dms_core.errors import AssemblyError, InputError, ModelError
 from dms_core.linear.rank import minimum_norm, minimum_norms
 from dms_core.model import Distance, Fixed, Gravity, PointMass, Revolute, RigidBody, Spherical, System
 from dms_core.model.geometry.frames import quaternion
-from dms_core.simulation.dynamics import Simulation, SolverOptions, simulate
-from dms_core.simulation.initial_rates import consistent_rates
-from dms_core.simulation.linear_solve import back_substitute, factorise
-from dms_core.simulation.newton import apply, right_hand_side, set_rates
-from dms_core.simulation.state import MODEL, STATE
+from dms_core.results import Result
+from dms_core.simulation.dynamics import SolverOptions, World, simulate
 from tests.dms_core.assembly.specimen import BODIES, CONSTRAINTS, FORCES, random_point, scales, specimen
 from tests.dms_core.test_derivatives import CONCRETE, differences
 
@@ -34,51 +28,44 @@ def model() -> Model:
 
 
 class Stage:
-    """One stage of the method at a random state with mu = 0: residual, matrix, linear solve."""
+    """One stage of the method at a random state with mu = 0: residual, matrix, factors."""
 
     def __init__(self, model: Model, c0: float, seed: int) -> None:
-        self.model, self.c0 = model, c0
-        self.simulation = Simulation(model)
-        self.m, self.s = model.tables.table, self.simulation._world.table
-        state, x, rng = self.simulation.state, random_point(model, seed), np.random.default_rng(seed)
-        n, w = model.n_q, state.w
-        evaluate_inputs(inner(self.s, STATE.signals), 0.3, False, inner(self.s, STATE.w))
-        w.q[:n], w.v[:n], w.lam[:] = x.q, x.v, x.lam
+        self.world, self.c0, self.x = World(model), c0, random_point(model, seed)
         # The stage's constants such that qdot = v and vdot = a, up to something.
-        state.cq[:] = x.v - c0 * x.q + rng.normal(size=n)
-        state.cv[:] = x.a - c0 * x.v
-        set_rates(self.s, c0)
+        self.cq = self.x.v - c0 * self.x.q + np.random.default_rng(seed).normal(size=model.n_q)
+        self.cv = self.x.a - c0 * self.x.v
+        self.point = self._point(self.x.q, self.x.v, self.x.lam, np.zeros(model.n_phi))
+        self.factors = self.world.newton_matrix(c0, self.point)
+        n, k = len(self.factors.coordinates), len(self.factors.rows)
+        self.by_row = np.repeat([1.0 / c0, 1.0 / c0**2, 1.0, 1.0 / c0], [n, n, k, k])
+        self.by_unknown = np.repeat([1.0, c0, c0**2, c0], [n, n, k, k])
+
+    def _point(self, q, v, lam, mu) -> OperatingPoint:
+        u = self.world.operating_point().u
+        return OperatingPoint(q, self.c0 * q + self.cq, v, self.c0 * v + self.cv, lam, mu, u)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """Scaled residual (r1 / c0, r2 / c0^2, r3, r4 / c0) at the present state plus the scaled correction x."""
-        apply(self.m, self.s, self.c0, x, 1.0)
-        evaluate_residual(inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.s, STATE.w))
-        right_hand_side(self.m, self.s, self.c0)
-        apply(self.m, self.s, self.c0, x, -1.0)
-        return -self.simulation.state.b
+        """Scaled residual (r1 / c0, r2 / c0^2, r3, r4 / c0) at the point plus the scaled correction x."""
+        at, factors = self.point, self.factors
+        q, v, lam, mu = (z.copy() for z in (at.q, at.v, at.lam, at.mu))
+        for whole, where, change in zip(
+            (q, v, lam, mu), 2 * [factors.coordinates] + 2 * [factors.rows], factors.parts(self.by_unknown * x),
+            strict=True,
+        ):  # fmt: skip
+            whole[where] += change
+        blocks = self.world.blocks(self._point(q, v, lam, mu))
+        return self.by_row * factors.equations(blocks.r1, blocks.r2, blocks.r3, blocks.r4)
 
     def matrix(self) -> np.ndarray:
-        """Dense scaled Newton matrix from its scatter maps."""
-        welds = self.model.welds
-        pattern, slots = newton_pattern(self.model.layout, welds.free, welds.solved)
-        packed, values = Packed(pattern), np.zeros(len(slots.number))
-        dynamics, constraints = inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints)
-        evaluate_newton(dynamics, constraints, packed.table, inner(self.s, STATE.w), self.c0, values)
-        rows, columns = slots.coordinates()
-        A = np.zeros((len(self.simulation.state.b),) * 2)
-        A[rows, columns] = values
-        return A
-
-    def solved(self, b: np.ndarray) -> np.ndarray:
-        """x of A x = b with the model's own LU."""
-        state, x = self.simulation.state, np.zeros(len(b))
-        evaluate_newton(
-            inner(self.m, MODEL.dynamics), inner(self.m, MODEL.constraints), inner(self.m, MODEL.newton),
-            inner(self.s, STATE.w), self.c0, state.newton_values,
-        )  # fmt: skip
-        assert factorise(self.m, MODEL.newton_lu, state.newton_values, state.newton_work) > 1e-8
-        back_substitute(self.m, MODEL.newton_lu, state.newton_values, b, x, state.newton_work)
-        return x
+        """Dense scaled Newton matrix from the blocks."""
+        n, m = len(self.point.q), len(self.point.lam)
+        kept = np.concatenate([
+            self.factors.coordinates, n + self.factors.coordinates, 2 * n + self.factors.rows,
+            2 * n + m + self.factors.rows,
+        ])  # fmt: skip
+        A = self.world.blocks(self.point).newton(self.c0).toarray()[np.ix_(kept, kept)]
+        return self.by_row[:, None] * A * self.by_unknown
 
 
 def _unknown_scales(model: Model, c0: float) -> np.ndarray:
@@ -112,58 +99,61 @@ def test_newton_matrix_is_the_derivative_of_the_residual(model, c0, seed):
     assert not len(wrong), [(names[i], names[j], A[i, j], numeric[i, j]) for i, j in wrong[:8]]
 
 
+@pytest.mark.parametrize("transposed", [False, True])
 @pytest.mark.parametrize("c0", [10.0, 1.5e3, 1e6])
-def test_the_models_own_lu_solves_with_that_matrix(model, c0):
+def test_the_models_own_lu_solves_with_that_matrix(model, c0, transposed):
     """The scatter into the LU and the elimination order, chosen at another state and another c0."""
     stage = Stage(model, c0, 1)
-    A, x = stage.matrix(), np.random.default_rng(2).normal(size=2 * len(model.welds.free) + 2 * len(model.welds.solved))
+    A, x = stage.matrix(), np.random.default_rng(2).normal(size=(stage.factors.size, 3))
+    row, unknown = stage.by_row[:, None], stage.by_unknown[:, None]
+    if transposed:
+        b = A.T @ x
+        found = stage.factors.solve_transposed(b / unknown) / row
+        left = A.T @ found
+    else:
+        b = A @ x
+        found = stage.factors.solve(b / row) / unknown
+        left = A @ found
     # A backward stable solve leaves 1e-15 of |A| |x|; pivots down to 1e-6 of their row cost the rest.
-    np.testing.assert_allclose(A @ stage.solved(A @ x), A @ x, atol=1e-8)
+    np.testing.assert_allclose(left, b, atol=1e-8)
+    one = (stage.factors.solve_transposed if transposed else stage.factors.solve)(b[:, 0])
+    several = (stage.factors.solve_transposed if transposed else stage.factors.solve)(b)
+    np.testing.assert_array_equal(one, several[:, 0])
 
 
-def test_acceleration_matrix_is_the_derivative_of_its_equations(model):
+def test_right_hand_sides_and_coefficients_that_do_not_fit_are_refused(model):
     stage = Stage(model, 10.0, 0)
-    w, free, solved = stage.simulation.state.w, model.welds.free, model.welds.solved
-    second = model.second_order[free]
-    pattern, slots = rate_pattern(model.layout, free, solved)
-    packed, values = Packed(pattern), np.zeros(len(slots.number))
-    start = np.concatenate([np.where(second, w.a[free], w.v[free]), w.lam[solved]])
-    v = w.v[free].copy()
+    with pytest.raises(InputError, match=r"Expected right-hand sides of shape \(\d+,\) .* got \(3,\)"):
+        stage.factors.solve(np.zeros(3))
+    with pytest.raises(InputError, match=r"Expected a positive leading coefficient c0 \[1/s\], got -1"):
+        stage.world.newton_matrix(-1.0)
 
-    def equations(x: np.ndarray) -> np.ndarray:
-        n = len(free)
-        w.a[free], w.v[free] = np.where(second, x[:n], 0.0), np.where(second, v, x[:n])
-        w.lam[solved] = x[n:]
-        dynamics, constraints = inner(stage.m, MODEL.dynamics), inner(stage.m, MODEL.constraints)
-        evaluate_rates(dynamics, constraints, packed.table, inner(stage.s, STATE.w), values)
-        return np.concatenate([w.r2[free], w.phi_a[solved]])
 
-    value = np.abs(equations(start)).max()
-    rows, columns = slots.coordinates()
-    A = np.zeros((len(start),) * 2)
-    A[rows, columns] = values
-    by = np.concatenate([scales(model)[1][free], np.full(len(solved), 10.0)])
-    numeric = differences(equations, start, by)
-    # Linear but for the force-velocity curve: rounding 1e-16 / 3e-5 of values near 1e3.
-    assert np.all(np.abs(A - numeric) <= 1e-6 * np.abs(numeric) + 1e-11 * value / by)
+def test_rates_behind_a_jump_close_the_equations_of_accelerations(model):
+    """r2 = 0 and phi_q vdot + (phi_q v)_q v + phi_tt = 0, at the start and where an input was set on the way."""
+    world = World(model)
+    for t in (0.0, 0.02, 0.05):
+        assert world.advance(t) is Result.SUCCESS
+        world.set_input("factor", 12.0 - 100.0 * t)
+        assert world.settle() is Result.SUCCESS
+        at = world.operating_point(behind=True)
+        blocks = world.blocks(at)
+        phi_tt = blocks.r3_u[:, :, 0] @ at.u[:, 2]
+        # Forces are near 1e3 N, accelerations near 1e2.
+        assert np.abs(blocks.r2).max() < 1e-8
+        assert np.abs(blocks.phi_q @ at.a + blocks.r4_q @ at.v + phi_tt)[model.active_rows].max() < 1e-8
 
 
 def test_start_satisfies_every_equation(model):
-    """phi, phi_q v + phi_t, and with consistent rates r2 and phi_q a + ... = 0, at the assembled start."""
-    phi, phi_v, _, _ = model.constraint_jacobian(model.start.q, model.start.v)
-    assert np.abs(phi).max() < 1e-12
-    assert np.abs(phi_v).max() < 1e-12
-    simulation = Simulation(model)
-    m, s, w = model.tables.table, simulation._world.table, simulation.state.w
-    evaluate_inputs(inner(s, STATE.signals), 0.0, False, inner(s, STATE.w))
-    assert consistent_rates(m, s)
-    state = simulation.state
-    x = (state.q[None], state.v[None], state.vd[None], state.lam[None])
-    w.lam[:] = model.whole_multipliers(state.signals, np.zeros(1), *x, np.ones(1, bool))[0]
-    whole = model.sensing.table
-    evaluate_residual(inner(whole, SENSING.dynamics), inner(whole, SENSING.constraints), inner(s, STATE.w))
+    """phi, phi_q v + phi_t, and with consistent rates r1 and r2 = 0, at the assembled start."""
+    world = World(model)
+    world.settle()
+    blocks = world.blocks(world.operating_point(behind=True))
+    assert np.abs(blocks.r3).max() < 1e-12
+    assert np.abs(blocks.r4).max() < 1e-12
+    assert not blocks.r1.any()
     # Forces are near 1e3 N.
-    assert np.abs(w.r2[: model.n_q]).max() < 1e-9
+    assert np.abs(blocks.r2).max() < 1e-9
     trajectory = simulate(model, 0.01, SolverOptions(rtol=1e-8))
     h = trajectory.t[1]
     # A second look that knows nothing of the rates' equations: what the first step does.

@@ -63,7 +63,9 @@ class TestCheck:
         wrong.write_text(PENDULUM.read_text().replace("body_j: rod", "body_j: rood"))
         done = command("check", wrong)
         assert done.status == USER_MISTAKE and done.out == ""
-        assert f"error: {wrong}: revolute 'hinge': body 'rood' does not exist. Declared: ground, rod." in done.err
+        assert (
+            f"error: {wrong}, line 11: revolute 'hinge': body 'rood' does not exist. Declared: ground, rod." in done.err
+        )
 
 
 class TestRun:

@@ -41,5 +41,5 @@ def test_rod_from_the_ground_takes_its_length_from_the_start():
 
 
 def test_mass_must_be_positive():
-    with pytest.raises(ModelError, match=r"point_mass 'ball': mass = 0.0: should be greater than 0"):
+    with pytest.raises(ModelError, match=r"point_mass 'ball': mass = 0.0: Expected a number above 0"):
         PointMass(name="ball", mass=0.0)

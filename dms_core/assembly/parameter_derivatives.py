@@ -1,0 +1,203 @@
+"""Derivatives of residual and sensors by a declared number: a mass, an attachment point, a gain.
+
+A declared number p moves numbers `par` of several kernels: a mass that of its body and of its weight, a centre of mass
+the arms of all joints of that body. dpar/dp is the central difference of two declared systems at p - h and p + h, with
+
+    h = STEP |p|, or STEP where p = 0          STEP = 6e-6 (input_derivatives.py)
+
+What an element's `parameter_kernel` gives is then exact but for dpar/dp; kernels without one, all constraints and all
+sensors are differenced over the same two sets of numbers. Where the numbers of a model were written in place
+(`Model.numbers`), the differences are taken about these.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel
+
+from dms_core.assembly.input_derivatives import STEP
+from dms_core.assembly.layout import Layout, same_structure
+from dms_core.assembly.local import clear, gather, views
+from dms_core.assembly.residual import evaluate_residual
+from dms_core.assembly.sensing import evaluate_sensors, new_sensing
+from dms_core.assembly.tables import Calls, flat
+from dms_core.compiled.arena import Packed, matrix
+from dms_core.compiled.calls import call_entry
+from dms_core.compiled.entries import SLOPES, Slopes, derivative_addresses
+from dms_core.compiled.jit import compiled
+from dms_core.errors import InputError, choices
+from dms_core.model.element import PARAMETER_DERIVATIVE
+from dms_core.model.system import System
+
+if TYPE_CHECKING:
+    from dms_core.assembly.blocks import OperatingPoint
+    from dms_core.assembly.model import Model
+
+
+class ParameterBlocks(NamedTuple):
+    """Derivatives of residual and sensors by one declared number p, at fixed q, qdot, v, vdot, lam, mu and u."""
+
+    r1: np.ndarray
+    """-(phi_q^T mu) by p, shape (n_q,)."""
+    r2: np.ndarray
+    r3: np.ndarray
+    """phi by p, shape (n_phi,)."""
+    r4: np.ndarray
+    y: np.ndarray
+    """Sensors by p, shape (n_y,); by differences."""
+    step: float
+    """h of the differences, in the unit of p."""
+    differenced: tuple[str, ...]
+    """Elements and constraints whose kernels were differenced; the others that p moves gave an analytic derivative."""
+
+
+class _Direction(NamedTuple):
+    """Half the difference of all numbers between p + h and p - h."""
+
+    step: float
+    dynamics: np.ndarray
+    constraints: np.ndarray
+    sensors: np.ndarray
+
+
+@compiled
+def dynamic_by_parameter(calls, kernel, e, w, slopes):
+    """Jp of dynamic call e at the state in w, into the packed Slopes; `kernel` is the address of its entry."""
+    Jp = matrix(slopes, SLOPES.Jp)
+    gather(views(calls, w), e, True)
+    clear(Jp, Jp.shape[0], Jp.shape[1])
+    call_entry(kernel, calls, e, slopes, 1)
+
+
+def _number(who: str, value: Any, keys: list[str]) -> float:
+    """The declared number at the end of these keys."""
+    for k, key in enumerate(keys):
+        at = f"{who}: '{'.'.join(keys[: k + 1])}'"
+        if isinstance(value, BaseModel):
+            if key not in type(value).model_fields:
+                raise InputError(f"{at} does not exist. Declared: {choices(type(value).model_fields)}.")
+            value = getattr(value, key)
+        elif isinstance(value, tuple):
+            if not key.isdigit() or int(key) >= len(value):
+                raise InputError(f"{at}: expected a place from 0 to {len(value) - 1}, got '{key}'.")
+            value = value[int(key)]
+        else:
+            raise InputError(f"{at}: nothing can follow {value!r}.")
+    if not isinstance(value, float):
+        raise InputError(f"{who}: expected '{'.'.join(keys)}' to be a number with a derivative, got {value!r}.")
+    return value
+
+
+def _moved(value: Any, keys: list[str], change: float) -> Any:
+    """The same declaration with the number at the end of the keys moved; nothing is validated again."""
+    if not keys:
+        return value + change
+    key, rest = keys[0], keys[1:]
+    if isinstance(value, BaseModel):
+        return value.model_copy(update={key: _moved(getattr(value, key), rest, change)})
+    return tuple(_moved(x, rest, change) if k == int(key) else x for k, x in enumerate(value))
+
+
+def _system_with(system: System, element: Any) -> System:
+    """The same system with one declaration replaced."""
+    norms = sum(body.rigid for body in system.bodies)
+    lists = (system.bodies, system.constraints[norms:], system.forces, system.sensors, system.inputs)
+    names = ("bodies", "constraints", "forces", "sensors", "inputs")
+    replaced = [[element if x.name == element.name else x for x in items] for items in lists]
+    return System(system.name, **dict(zip(names, replaced, strict=True)))
+
+
+class ParameterDerivatives:
+    """Derivatives of one model by declared numbers; what a number moves is found once."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        calls = model.layout.dynamics
+        self._kernels = derivative_addresses(calls, "parameter_kernel", PARAMETER_DERIVATIVE)
+        work = model.sensing.values.work.values
+        most = max(len(c.placement.numbers) for c in calls)
+        slopes = Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((1, 3)), np.zeros((len(work.q_l), most)))
+        self._slopes = Packed(slopes)
+        self._directions: dict[tuple[str, str], _Direction] = {}
+
+    def _direction(self, name: str, path: str) -> _Direction:
+        """What the number moves.
+
+        Raises:
+            InputError: there is no such number, or moving it changes more than numbers.
+        """
+        if (name, path) in self._directions:
+            return self._directions[name, path]
+        system, keys = self._model.system, path.split(".")
+        element = system.element(name)
+        p = _number(f"{element.kind} '{name}'", element, keys)
+        h = STEP * (abs(p) or 1.0)
+        low, high = (Layout(_system_with(system, _moved(element, keys, x))) for x in (-h, h))
+        if not (same_structure(low, self._model.layout) and same_structure(high, self._model.layout)):
+            raise InputError(f"{element.kind} '{name}': '{path}' = {p} cannot be moved alone: the structure changes.")
+        halves = [
+            0.5 * (_numbers(a) - _numbers(b))
+            for a, b in zip(
+                (high.dynamics, high.constraints, high.sensors), (low.dynamics, low.constraints, low.sensors),
+                strict=True,
+            )
+        ]  # fmt: skip
+        return self._directions.setdefault((name, path), _Direction(h, *halves))
+
+    def of(self, name: str, path: str, point: OperatingPoint) -> ParameterBlocks:
+        """Derivatives by the number `path` of element `name` at the point."""
+        model, direction = self._model, self._direction(name, path)
+        w = model.derivatives.put(point)
+        sensing, n = model.sensing.values, model.n_q
+        dynamics, ptr = sensing.dynamics.values, sensing.dynamics.values.par_ptr
+        analytic, rest = np.zeros(n + 7), direction.dynamics.copy()
+        for e in np.flatnonzero(self._kernels):
+            part = slice(ptr[e], ptr[e + 1])
+            if direction.dynamics[part].any():
+                analytic += self._analytic(int(e), direction.dynamics[part] / direction.step)
+                rest[part] = 0.0
+        ends = []
+        for sign in (1.0, -1.0):
+            d = Packed(_with(dynamics, sign * rest))
+            c = Packed(_with(sensing.constraints.values, sign * direction.constraints))
+            s = Packed(_with(sensing.sensors.values, sign * direction.sensors))
+            evaluate_residual(d.table, c.table, sensing.work.table)
+            rows = (-w.gmu[:n], w.r2[:n].copy(), w.phi.copy(), w.phi_v.copy())
+            d = Packed(_with(dynamics, sign * direction.dynamics))
+            evaluate_sensors(new_sensing(d, c, s, sensing.composed, sensing.work).table)
+            ends.append((*rows, w.y.copy()))
+        r1, r2, r3, r4, y = (0.5 * (high - low) / direction.step for high, low in zip(*ends, strict=True))
+        return ParameterBlocks(
+            r1, r2 + analytic[:n], r3, r4, y, direction.step, self._differenced(rest, direction.constraints)
+        )
+
+    def _analytic(self, e: int, slope: np.ndarray) -> np.ndarray:
+        """Jp dpar/dp of dynamic call e in the rows of r2, shape (n_q + 7,)."""
+        call, sensing = self._model.layout.dynamics[e], self._model.sensing.values
+        dynamic_by_parameter(sensing.dynamics.table, self._kernels[e], e, sensing.work.table, self._slopes.table)
+        rows = np.zeros(self._model.n_q + 7)
+        np.add.at(rows, call.iq, self._slopes.values.Jp[: len(call.iq), : len(slope)] @ slope)
+        return rows
+
+    def _differenced(self, dynamics: np.ndarray, constraints: np.ndarray) -> tuple[str, ...]:
+        """Names of elements and constraints any of whose numbers are moved."""
+        layout, sensing, names = self._model.layout, self._model.sensing.values, []
+        for calls, table, moved in (
+            (layout.dynamics, sensing.dynamics.values, dynamics),
+            (layout.constraints, sensing.constraints.values, constraints),
+        ):
+            ptr = table.par_ptr
+            names += [c.element.name for e, c in enumerate(calls) if moved[ptr[e] : ptr[e + 1]].any()]
+        return tuple(dict.fromkeys(names))
+
+
+def _numbers(calls: list) -> np.ndarray:
+    """Numbers of all calls, flat."""
+    return flat([c.placement.numbers for c in calls], np.float64)[0]
+
+
+def _with(calls: Calls, change: np.ndarray) -> Calls:
+    """The same calls with other numbers."""
+    return calls._replace(par=calls.par + change)

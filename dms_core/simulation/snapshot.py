@@ -1,0 +1,135 @@
+"""A world as a value: everything that its future depends on, to be put back later, here or in another process.
+
+That is the present state (q, v, qdot, vdot, lam, mu), the past of the method, clock and counts, the inputs as they were
+set, the factorised matrices that are still in use, and the order of elimination, which may have been chosen anew. The
+model is not part of it: a snapshot names its model by the structure and by all numbers of it, and goes into no other.
+Inputs that are functions of time, and kernels, are told apart by their names only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dms_core.assembly.sparsity import NewtonPattern, RatePattern
+from dms_core.assembly.tables import Signals, Tables
+from dms_core.compiled.arena import Packed
+from dms_core.errors import InputError
+from dms_core.linear.lu import LuTables
+from dms_core.model.signals import Function
+from dms_core.results import Result
+from dms_core.simulation.state import CLOCK, State, with_tables
+
+if TYPE_CHECKING:
+    from dms_core.assembly.model import Model
+    from dms_core.simulation.dynamics import SolverOptions
+
+GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")
+"""Fields of Work that outlive a kernel call; the others are local arrays, written before they are read."""
+
+
+class Orders(NamedTuple):
+    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders of elimination."""
+
+    active: np.ndarray
+    newton: NewtonPattern
+    newton_lu: LuTables
+    rates: RatePattern
+    rate_lu: LuTables
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """An immutable copy of a world; it can be compared, pickled and restored any number of times."""
+
+    system: str
+    """Name of the system."""
+    time: float
+    """Time reached [s]."""
+    options: SolverOptions
+    result: Result
+    structure: str = field(repr=False)
+    """Digest of elements, joints and inputs."""
+    numbers: str = field(repr=False)
+    """Digest of all numbers of the model."""
+    arrays: tuple[bytes, ...] = field(repr=False)
+    """The arrays of `held_arrays`, in their order."""
+    orders: Orders = field(repr=False, compare=False)
+
+
+def held_arrays(state: State) -> Iterator[np.ndarray]:
+    """Every array of a world that its future may depend on."""
+    yield from (getattr(state.w, name) for name in GLOBAL_WORK)
+    yield from (state.signals.t, state.signals.c)
+    yield state.counts
+    # Whole numbers elsewhere are addresses of machine code, which belong to a process.
+    yield from (x for x in state if isinstance(x, np.ndarray) and x.dtype == np.float64)
+
+
+def _digest(*parts: Any) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        data = np.ascontiguousarray(part).tobytes() if isinstance(part, np.ndarray) else str(part).encode()
+        digest.update(len(data).to_bytes(8, "little") + data)
+    return digest.hexdigest()
+
+
+def _structure(model: Model, signals: Signals) -> str:
+    """Digest of the layout and of the form of the inputs; functions of time are known by their names only."""
+    functions = [
+        getattr(i.signal.function, "__qualname__", "") for i in model.system.inputs if isinstance(i.signal, Function)
+    ]
+    return _digest(model.layout.digest, signals.kind, signals.ptr, signals.jumps, functions)
+
+
+def take(model: Model, tables: Tables, state: State, options: SolverOptions, result: Result) -> Snapshot:
+    """The world as it is now."""
+    orders = Orders(tables.active, tables.newton, tables.newton_lu, tables.rates, tables.rate_lu)
+    return Snapshot(
+        model.system.name, float(state.clock[CLOCK.t]), options, result, _structure(model, state.signals),
+        _digest(*model.numbers), tuple(x.tobytes() for x in held_arrays(state)), orders,
+    )  # fmt: skip
+
+
+def check(snapshot: Snapshot, model: Model, signals: Signals, options: SolverOptions) -> None:
+    """Refuse what another model or other options have made.
+
+    Raises:
+        InputError: says which of them differs.
+    """
+    own, what = model.system.name, f"The snapshot of system '{snapshot.system}' at t = {snapshot.time:.6g} s"
+    if snapshot.structure != _structure(model, signals):
+        raise InputError(
+            f"{what} cannot be restored in a world of system '{own}': elements, joints, sensors or the form of inputs "
+            "differ. Expected a world of the same model."
+        )
+    if snapshot.numbers != _digest(*model.numbers):
+        raise InputError(
+            f"{what} cannot be restored in a world of system '{own}' whose numbers (masses, lengths, gains) differ. "
+            "Expected a world of the same model."
+        )
+    for one in fields(options):
+        there, here = getattr(snapshot.options, one.name), getattr(options, one.name)
+        if there != here:
+            raise InputError(f"{what} was taken with {one.name} = {there!r}; this world has {one.name} = {here!r}.")
+
+
+def tables_with(orders: Orders, present: Packed, model: Model) -> Packed:
+    """Tables of the model with these orders: the present ones, or the model's own, where these have them."""
+    for tables in (present, model.tables):
+        if tables.values.newton_lu is orders.newton_lu and tables.values.rate_lu is orders.rate_lu:
+            return tables
+    return Packed(model.tables.values._replace(**orders._asdict()))
+
+
+def put_back(snapshot: Snapshot, tables: Packed, old_tables: Packed, world: Packed) -> Packed:
+    """The packed world with the snapshot's values; arrays stay where they are unless the orders differ."""
+    if tables is not old_tables:
+        world = with_tables(tables.values, world.values)
+    for array, data in zip(held_arrays(world.values), snapshot.arrays, strict=True):
+        array[...] = np.frombuffer(data, array.dtype).reshape(array.shape)
+    return world
