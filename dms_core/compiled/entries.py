@@ -107,8 +107,7 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
         kernel: Any = type(element).kernel
         if kernel is not None and not is_jitted(kernel):
             raise ModelError(
-                f"{element.kind} '{element.name}': its kernel is {kernel!r}; a function decorated with numba.njit is "
-                "wanted."
+                f"{element.kind} '{element.name}': Expected a kernel decorated with numba.njit, got {kernel!r}."
             )
         addresses.append(0 if kernel is None else address(entry(kernel, signature), ENTRY))
     return Calls(

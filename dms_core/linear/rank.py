@@ -13,11 +13,11 @@ import scipy.linalg as la
 from dms_core.errors import InputError
 
 RANK_TOLERANCE = 1e-9
-"""Of the largest singular value of the normalised rows; kinematic rows are exact to about 1e-14."""
+"""Share of the largest singular value of the normalised rows; kinematic rows are exact to about 1e-14."""
 
 
 SHIFT, REFINEMENTS = 1e-9, 4
-"""Of minimum_norms; singular values down to 1e-3 of the largest are then treated to about 1e-12."""
+"""Share of the largest singular value in minimum_norms; those down to 1e-3 of it are then treated to about 1e-12."""
 
 
 class RowRank(NamedTuple):
@@ -28,7 +28,7 @@ class RowRank(NamedTuple):
     redundant: np.ndarray
     """The other rows, ascending, shape (m - rank,)."""
     singular_values: np.ndarray
-    """Of the rows scaled to length 1, descending, shape (min(m, n),)."""
+    """Singular values of the rows scaled to length 1, descending, shape (min(m, n),)."""
     combination: np.ndarray
     """C with G[redundant] = C G[independent], shape (m - rank, rank): what each redundant row follows from."""
 

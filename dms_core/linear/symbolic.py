@@ -41,7 +41,7 @@ class LuTables(NamedTuple):
     fill: int
     """Non-zeros of L + U (the diagonal once)."""
     multiply_adds: int
-    """Of one factorisation, zeros inside blocks not counted."""
+    """Multiplications and additions of one factorisation, without those on zeros inside blocks."""
     position: np.ndarray
     """Where in `a` each entry of the input goes, shape (nnz,), int32; repeated entries share a place."""
     row_of: np.ndarray
