@@ -26,8 +26,10 @@ INTERVAL = 10.0
 """Time between two lines about the progress where there is no terminal whose line could be rewritten [s]."""
 WIDTH = 79
 """Characters of the line on a terminal."""
+SHAPING = (b"@compiled", b"NamedTuple")
+"""What a source holds that shapes compiled code: functions, or the places of what they read."""
 LAYOUT = ("assembly", "compiled")
-"""Sources that say where compiled code finds its arrays, whether they hold compiled functions or not."""
+"""Folders all of whose sources count, whether they hold such a thing or not."""
 
 
 def fingerprint(package: Path = PACKAGE) -> str:
@@ -36,7 +38,7 @@ def fingerprint(package: Path = PACKAGE) -> str:
     for folder in dict.fromkeys((PACKAGE, package)):
         for path in sorted(folder.rglob("*.py")):
             text, place = path.read_bytes(), path.relative_to(folder)
-            if b"@compiled" in text or place.parts[0] in LAYOUT:
+            if any(mark in text for mark in SHAPING) or place.parts[0] in LAYOUT:
                 digest.update(place.as_posix().encode() + b"\0" + text)
     return digest.hexdigest()
 
