@@ -26,6 +26,8 @@ INTERVAL = 10.0
 """Time between two lines about the progress where there is no terminal whose line could be rewritten [s]."""
 WIDTH = 79
 """Characters of the line on a terminal."""
+CALLED = "_called"
+"""End of the name under which a function is compiled for callers that are compiled themselves."""
 SHAPING = (b"@compiled", b"NamedTuple")
 """What a source holds that shapes compiled code: functions, or the places of what they read."""
 LAYOUT = ("assembly", "compiled")
@@ -113,7 +115,7 @@ class _Announcer(event.Listener):
     def _show(self, function: Any, now: float) -> None:
         """The function at work, and how many are done."""
         # Inner functions of numba's own are compiled on the way.
-        name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+        name = f"{function.__module__.rpartition('.')[2]}.{function.__name__.removesuffix(CALLED)}"
         total = max(_functions, self._done + 1)
         text = f"{self._done} of at most {total} functions, {now - self._began:.0f} s: {name}"
         if self._stream.isatty():
