@@ -90,12 +90,12 @@ def run(
         step: constant step [s] instead of error control; rtol then only sets how far Newton's method goes.
     """
     if not (np.isfinite(t_end) and t_end > 0.0):
-        raise InputError(f"--t-end {t_end}: a positive time [s] is wanted.")
+        raise InputError(f"--t-end: Expected a positive time [s], got {t_end}.")
     if sample is not None and not (np.isfinite(sample) and sample > 0.0):
-        raise InputError(f"--sample {sample}: a positive time [s] is wanted.")
+        raise InputError(f"--sample: Expected a positive time [s], got {sample}.")
     for name, value in (("--rtol", rtol), ("--atol", atol), ("--step", step)):
         if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise InputError(f"{name} {value}: a positive number is wanted.")
+            raise InputError(f"{name}: Expected a positive number, got {value}.")
     options = SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
     for path in (out, stats):
         if path is not None:

@@ -73,7 +73,7 @@ def load(path: str | Path) -> System:
         raise ModelError(f"{path}: unknown key {_quoted(unknown)} at the top. Allowed: {allowed}.")
     name = content.get("name", Path(path).stem)
     if not isinstance(name, str):
-        raise ModelError(f"{path}: name = {name!r}: a text is wanted.")
+        raise ModelError(f"{path}: name: Expected a text, got {name!r}.")
     items = {section: _section(path, section, content.get(section)) for section in BRANCHES}
     lines = {declared.name: line for found in items.values() for declared, line in found}
     try:
@@ -99,7 +99,7 @@ def _section(path: str | Path, section: str, items: Any) -> list[tuple[Declarati
     if items is None:
         return []
     if not isinstance(items, list):
-        raise ModelError(f"{path}: {section} = {items!r}: a list is wanted, each item beginning with '- '.")
+        raise ModelError(f"{path}: {section}: Expected a list whose items begin with '- ', got {items!r}.")
     return [(_declaration(path, section, item), getattr(item, "line", 0)) for item in items]
 
 

@@ -74,7 +74,7 @@ def read_yaml(path: str | Path) -> Section:
         raise InputError(_sentence(path, error)) from None
     if not isinstance(found, Section):
         what = "nothing" if found is None else f"a {type(found).__name__}"
-        raise InputError(f"file '{path}' holds {what}; a mapping of keys to values is wanted.")
+        raise InputError(f"file '{path}' holds {what}. Expected a mapping of keys to values.")
     return found
 
 

@@ -108,7 +108,7 @@ def reaction_partials(constraints, sensors, e, w, c, by_q, by_lam):
 
 @compiled
 def _frame_partials(w, n, frame, row, force, moment, columns, by_q):
-    """What the turning of the frame itself adds."""
+    """Add what the turning of the frame itself contributes."""
     Yq, q = matrix(w, WORK.G), floats(w, WORK.q_l)
     for i in range(3):
         unit = (1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2))
@@ -165,7 +165,7 @@ def _moment_of_column(J, j, o, q, lever, axis):
 
 @compiled
 def _own_partials(w, o, columns, axis, force, row, by_q):
-    """By the position and the Euler parameters of the loaded body itself."""
+    """Add the derivatives by the position and the Euler parameters of the loaded body itself."""
     r, about = floats(w, WORK.r_l), cross(force, axis)
     for i in range(3):
         by_q[row, columns[o + i]] += about[i]

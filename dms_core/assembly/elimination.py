@@ -1,4 +1,4 @@
-"""Bodies welded to the ground: solved before the run starts, their reactions recovered when somebody asks.
+"""Bodies welded to the ground: left out of the equations of a step, their reactions found when they are read.
 
 A body that fixed joints join to the ground, itself or through others, cannot move. Its coordinates are constants, and
 the rows of its joints and norms hold by themselves; both are left out of the linear systems of a step. The multipliers

@@ -137,7 +137,7 @@ class Layout:
 
 
 def _placed(element: DynamicElement | Constraint | Sensor, system: System) -> tuple[Placement, ...]:
-    """Placements of an element; what it asks of the system in vain is an error that names the element."""
+    """Placements of an element; a name in it that does not exist is an error that names the element, too."""
     try:
         return element.placements(system) if isinstance(element, DynamicElement) else (element.place(system),)
     except ModelError as error:

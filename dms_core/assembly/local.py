@@ -2,7 +2,7 @@
 
 A loop takes `views` of the arrays once and hands them on; from the tables, each call would have to look them up anew,
 since for all the compiler knows a kernel may have changed them. What takes them is compiled into the loop, so that
-nothing is passed; none of it can be called from Python.
+nothing is passed.
 """
 
 from typing import NamedTuple
@@ -47,7 +47,7 @@ class Views(NamedTuple):
     W: np.ndarray
 
 
-@compiled(makes_arrays=True, forceinline=True, no_cpython_wrapper=True)
+@compiled(makes_arrays=True, forceinline=True)
 def views(calls, w):
     """What a loop over `calls` needs at each of them."""
     return Views(
@@ -60,7 +60,7 @@ def views(calls, w):
     )  # fmt: skip
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def clear(block, m, n):
     """block[:m, :n] = 0."""
     for i in range(m):
@@ -68,7 +68,7 @@ def clear(block, m, n):
             block[i, j] = 0.0
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def gather(x, e, with_accelerations):
     """Copy the local q, v, inputs and, if asked for, vdot of call e; gives the number of local coordinates."""
     start = x.iq_ptr[e]
@@ -85,7 +85,7 @@ def gather(x, e, with_accelerations):
     return n
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def evaluate_dynamic(x, calls, e, w, level):
     """Run the dynamic kernel of call e into r_l and, for level 1, Jq, Jv, Ja; gives n."""
     n = gather(x, e, True)
@@ -99,7 +99,7 @@ def evaluate_dynamic(x, calls, e, w, level):
     return n
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def add_dynamic_rows(x, e, n):
     """r2 += r_l of call e."""
     start = x.iq_ptr[e]
@@ -107,7 +107,7 @@ def add_dynamic_rows(x, e, n):
         x.r2[x.iq[start + i]] += x.r_l[i]
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def evaluate_constraint(x, calls, e, w, level):
     """Run the constraint kernel of call e into phi_l, phi_t_l, G and, for level 1, W, H, with its vdot; gives n."""
     n = gather(x, e, level > 0)
@@ -124,7 +124,7 @@ def evaluate_constraint(x, calls, e, w, level):
     return n
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def put_constraint_values(x, e, n):
     """Rows of phi and phi_q v + phi_t of call e."""
     row = x.row[e]
@@ -135,7 +135,7 @@ def put_constraint_values(x, e, n):
         x.phi[row + k], x.phi_v[row + k] = x.phi_l[k], rate
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def add_constraint_forces(x, e, n):
     """phi_q^T lam into r2 and phi_q^T mu into gmu, of call e."""
     start, row = x.iq_ptr[e], x.row[e]
@@ -146,7 +146,7 @@ def add_constraint_forces(x, e, n):
             x.gmu[x.iq[start + i]] += x.G[k, i] * mu
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def put_acceleration_rows(x, e, n):
     """phi_a = phi_q vdot + (phi_q v)_q v + phi_tt of call e, evaluated at level 1."""
     row = x.row[e]
@@ -157,7 +157,7 @@ def put_acceleration_rows(x, e, n):
         x.phi_a[row + k] = rate
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def evaluate_sensor(x, sensors, e, first, end, w, level):
     """Run the sensor kernel of call e into y_l and, for level 1, its derivatives; lam[first:end] is handed in."""
     n = gather(x, e, True)

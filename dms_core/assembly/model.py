@@ -14,7 +14,7 @@ from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_sy
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
-from dms_core.assembly.sensing import Partials, composition, measure, new_sensing
+from dms_core.assembly.sensing import SENSING_CODE, Partials, composition, measure, new_sensing
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
 from dms_core.compiled import side_by_side
@@ -57,7 +57,7 @@ class Model:
     def __init__(self, system: System, like: Model | None = None) -> None:
         announce()
         self.system = system
-        side_by_side.begin([ORDER_CODE, *side_by_side.registered()], evaluate_rates)
+        side_by_side.begin([ORDER_CODE, SENSING_CODE, *side_by_side.registered()], evaluate_rates)
         self.layout = layout = Layout(system)
         _warn_of_unread_inputs(layout)
         self.n_q, self.n_phi = layout.n_q, layout.n_phi

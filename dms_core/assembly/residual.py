@@ -88,14 +88,14 @@ def evaluate_residual(dynamics, constraints, w):
         add_constraint_forces(y, e, n)
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def _dynamic_derivatives(x, calls, e, w):
     """Values of dynamic call e into the residual, its derivatives into the local arrays."""
     n = evaluate_dynamic(x, calls, e, w, 1)
     add_dynamic_rows(x, e, n)
 
 
-@compiled(forceinline=True, no_cpython_wrapper=True)
+@compiled(forceinline=True)
 def _constraint_derivatives(x, calls, e, w):
     """Values and forces of constraint call e into the residual, its derivatives into the local arrays; gives n."""
     n = evaluate_constraint(x, calls, e, w, 1)

@@ -15,6 +15,7 @@ from dms_core.assembly.layout import Layout
 from dms_core.assembly.local import evaluate_sensor, views
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.assembly.tables import CALLS, WORK
+from dms_core.compiled import side_by_side
 from dms_core.compiled.arena import Packed, fields, floats, indices, inner, ints, matrix
 from dms_core.compiled.calls import TABLE_CALL, address, call_with_table
 from dms_core.compiled.jit import compiled
@@ -61,6 +62,8 @@ class Partials(NamedTuple):
     u: np.ndarray
 
 
+SENSING_CODE = "dms_core.assembly.sensing:compile_sensing_code"
+"""Work for a second process, see side_by_side.py."""
 COMPOSITION, PARTIALS, SENSING = fields(Composition), fields(Partials), fields(Sensing)
 
 
@@ -79,7 +82,13 @@ def composition(layout: Layout) -> Composition:
 
 def new_sensing(dynamics: Packed, constraints: Packed, sensors: Packed, composed: Packed, work: Packed) -> Packed:
     """A packed Sensing of packed tables: three of Calls, a Composition and a Work."""
+    side_by_side.wait_for(SENSING_CODE)
     return Packed(Sensing(dynamics, constraints, sensors, composed, work, _evaluation()))
+
+
+def compile_sensing_code() -> None:
+    """Compile what reads all sensors, the same for every model."""
+    _evaluation()
 
 
 @cache

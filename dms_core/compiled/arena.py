@@ -47,7 +47,8 @@ class Packed:
                     np.bool_,
                 ):
                     raise TypeError(
-                        f"{values._fields[k]}: a contiguous array of floats, integers or booleans is wanted."
+                        f"{values._fields[k]}: Expected a contiguous array of floats, integers or booleans, "
+                        f"got {value.dtype} of shape {value.shape}."
                     )
                 self.table[k] = (value.ctypes.data, value.shape[0], value.shape[1] if value.ndim > 1 else 1)
             else:

@@ -26,8 +26,12 @@ INTERVAL = 10.0
 """Time between two lines about the progress where there is no terminal whose line could be rewritten [s]."""
 WIDTH = 79
 """Characters of the line on a terminal."""
+CALLED = "_called"
+"""End of the name under which a function is compiled for callers that are compiled themselves."""
+SHAPING = (b"@compiled", b"NamedTuple")
+"""What a source holds that shapes compiled code: functions, or the places of what they read."""
 LAYOUT = ("assembly", "compiled")
-"""Sources that say where compiled code finds its arrays, whether they hold compiled functions or not."""
+"""Folders all of whose sources count, whether they hold such a thing or not."""
 
 
 def fingerprint(package: Path = PACKAGE) -> str:
@@ -36,7 +40,7 @@ def fingerprint(package: Path = PACKAGE) -> str:
     for folder in dict.fromkeys((PACKAGE, package)):
         for path in sorted(folder.rglob("*.py")):
             text, place = path.read_bytes(), path.relative_to(folder)
-            if b"@compiled" in text or place.parts[0] in LAYOUT:
+            if any(mark in text for mark in SHAPING) or place.parts[0] in LAYOUT:
                 digest.update(place.as_posix().encode() + b"\0" + text)
     return digest.hexdigest()
 
@@ -111,7 +115,7 @@ class _Announcer(event.Listener):
     def _show(self, function: Any, now: float) -> None:
         """The function at work, and how many are done."""
         # Inner functions of numba's own are compiled on the way.
-        name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+        name = f"{function.__module__.rpartition('.')[2]}.{function.__name__.removesuffix(CALLED)}"
         total = max(_functions, self._done + 1)
         text = f"{self._done} of at most {total} functions, {now - self._began:.0f} s: {name}"
         if self._stream.isatty():

@@ -119,7 +119,9 @@ def entry(kernel: Any, signature: Any) -> Any:
         co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
     )
     options = {k: v for k, v in kernel.targetoptions.items() if k not in ("nopython", "cache")}
-    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": options.get("_nrt", True)}
+    # Nobody calls an entry, or the copy of the kernel in it, from Python.
+    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+    habits["_nrt"] = options.get("_nrt", True)
     within = njit(function, locals=kernel.locals, **{**options, **habits, "forceinline": True})
     known = {**form.__globals__, "_kernel": within}
     found = FunctionType(code, known, name)
@@ -168,8 +170,7 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
         kernel: Any = type(element).kernel
         if kernel is not None and not is_jitted(kernel):
             raise ModelError(
-                f"{element.kind} '{element.name}': its kernel is {kernel!r}; a function decorated with numba.njit is "
-                "wanted."
+                f"{element.kind} '{element.name}': Expected a kernel decorated with numba.njit, got {kernel!r}."
             )
         addresses.append(0 if kernel is None else address(entry(kernel, signature), ENTRY))
     return Calls(

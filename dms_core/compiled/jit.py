@@ -8,11 +8,12 @@ disk, and a division by zero gives inf or nan as in numpy, so that a kernel call
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any
 
 from numba import njit, types
 
-from dms_core.compiled.compilation import count_function, drop_stale_code
+from dms_core.compiled.compilation import CALLED, count_function, drop_stale_code
 
 drop_stale_code()
 
@@ -32,11 +33,25 @@ def compiled(function: Callable | None = None, makes_arrays: bool | None = None,
     counted = not function.__module__.startswith("dms_core.") if makes_arrays is None else makes_arrays
     habits: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": counted}
     dispatcher = njit(**habits, **options)(function)
-    by_types = dispatcher.get_call_template
+    inner = njit(**{**habits, **options, "no_cpython_wrapper": True})(_renamed(function))
+    by_types = inner.get_call_template
 
     def get_call_template(args: tuple, kws: dict) -> Any:
         return by_types(tuple(types.unliteral(a) for a in args), {k: types.unliteral(a) for k, a in kws.items()})
 
-    dispatcher.get_call_template = get_call_template
+    dispatcher.get_call_template, dispatcher.get_overload = get_call_template, inner.get_overload
     count_function()
     return dispatcher
+
+
+def _renamed(function: Callable) -> FunctionType:
+    """The function under a name of its own, as numba keeps machine code by name.
+
+    Most functions are called from compiled code only. What lets Python call one, its arguments taken out of objects, is
+    a good part of its code; so callers that are compiled get this copy, which is without.
+    """
+    name = f"{function.__name__}{CALLED}"
+    code = function.__code__.replace(co_name=name, co_qualname=name)
+    copy = FunctionType(code, function.__globals__, name, function.__defaults__, function.__closure__)
+    copy.__module__, copy.__qualname__ = function.__module__, name
+    return copy

@@ -135,15 +135,6 @@ def solve_transposed(tables, a, b, x, work):
 
 
 @compiled
-def residual(rows, cols, values, b, x, r):
-    """r = b - A x from the entries of A; a check on a factorisation, and the start of a refinement step."""
-    for k in range(b.size):
-        r[k] = b[k]
-    for e in range(rows.size):
-        r[rows[e]] -= values[e] * x[cols[e]]
-
-
-@compiled
 def assemble(tables, values, a):
     """Writes a matrix given as entries, in the order of tables.position, into the storage array a."""
     a[:] = 0.0
@@ -151,4 +142,4 @@ def assemble(tables, values, a):
         a[tables.position[e]] += values[e]
 
 
-__all__ = ["LuTables", "assemble", "factor", "residual", "solve", "solve_transposed", "storage"]
+__all__ = ["LuTables", "assemble", "factor", "solve", "solve_transposed", "storage"]

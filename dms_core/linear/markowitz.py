@@ -112,7 +112,7 @@ def _close_all(X):
 
 @compiled(makes_arrays=True)
 def _make_room(X, values, line, wanted):
-    """Lets a line hold `wanted` entries; values has entries only for rows. False when the store is full."""
+    """Make room for `wanted` entries in a line; values has entries only for rows. False when the store is full."""
     if wanted <= X.room[line]:
         return True
     new, size = X.used[0], 2 * wanted

@@ -13,11 +13,11 @@ import scipy.linalg as la
 from dms_core.errors import InputError
 
 RANK_TOLERANCE = 1e-9
-"""Of the largest singular value of the normalised rows; kinematic rows are exact to about 1e-14."""
+"""Share of the largest singular value of the normalised rows; kinematic rows are exact to about 1e-14."""
 
 
 SHIFT, REFINEMENTS = 1e-9, 4
-"""Of minimum_norms; singular values down to 1e-3 of the largest are then treated to about 1e-12."""
+"""Share of the largest singular value in minimum_norms; those down to 1e-3 of it are then treated to about 1e-12."""
 
 
 class RowRank(NamedTuple):
@@ -28,7 +28,7 @@ class RowRank(NamedTuple):
     redundant: np.ndarray
     """The other rows, ascending, shape (m - rank,)."""
     singular_values: np.ndarray
-    """Of the rows scaled to length 1, descending, shape (min(m, n),)."""
+    """Singular values of the rows scaled to length 1, descending, shape (min(m, n),)."""
     combination: np.ndarray
     """C with G[redundant] = C G[independent], shape (m - rank, rank): what each redundant row follows from."""
 
@@ -71,33 +71,19 @@ def independent_rows(G: np.ndarray, tol: float = RANK_TOLERANCE) -> RowRank:
     return RowRank(independent, redundant, values, combination)
 
 
-def minimum_norm(G: np.ndarray, lam: np.ndarray, tol: float = RANK_TOLERANCE) -> np.ndarray:
-    """The shortest multipliers with the same constraint force G^T lam: lam* = G (G^T G)^+ G^T lam.
+def minimum_norms(G: np.ndarray, lam: np.ndarray) -> np.ndarray:
+    """The shortest multipliers with the same constraint forces G^T lam: lam* = G (G^T G)^+ G^T lam, for k matrices.
 
     With redundant constraints only G^T lam is determined by the motion. Of all lam with that force, lam* is the
     projection on the range of G. It shares the load among redundant rows as equal springs would, so that single
     reactions of a redundant joint are a convention (and depend on the units of the rows), while their sum is not.
 
+    The pseudo-inverse is that of Tikhonov's regularisation with refinement: what the small shift spoils is a share
+    SHIFT / sigma^2 of the part along a singular value sigma; each pass takes that share again.
+
     Args:
-        G: phi_q, shape (m, n).
-        lam: multipliers, shape (m,) or several as columns, shape (m, k).
-        tol: singular values below tol times the largest count as zero.
-    """
-    G, lam = _checked(G), np.asarray(lam, float)
-    if lam.shape[:1] != G.shape[:1]:
-        raise InputError(f"lam has shape {lam.shape}; G has {G.shape[0]} rows.")
-    if G.size == 0:
-        return np.zeros_like(lam)
-    left, values, _ = la.svd(G, full_matrices=False)
-    basis = left[:, values > tol * max(values[0], 1e-300)]
-    return basis @ (basis.T @ lam)
-
-
-def minimum_norms(G: np.ndarray, lam: np.ndarray) -> np.ndarray:
-    """As minimum_norm, for many matrices at once: shapes (k, m, n) and (k, m).
-
-    lam* = G (G^T G)^+ G^T lam, with the pseudo-inverse by Tikhonov's regularisation and refinement: what the small
-    shift spoils is a share SHIFT / sigma^2 of the part along a singular value sigma; each pass takes that share again.
+        G: phi_q, shape (k, m, n).
+        lam: multipliers, shape (k, m).
     """
     k, m, n = G.shape
     transposed = np.swapaxes(G, 1, 2)

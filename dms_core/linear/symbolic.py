@@ -41,7 +41,7 @@ class LuTables(NamedTuple):
     fill: int
     """Non-zeros of L + U (the diagonal once)."""
     multiply_adds: int
-    """Of one factorisation, zeros inside blocks not counted."""
+    """Multiplications and additions of one factorisation, without those on zeros inside blocks."""
     position: np.ndarray
     """Where in `a` each entry of the input goes, shape (nnz,), int32; repeated entries share a place."""
     row_of: np.ndarray
@@ -201,7 +201,8 @@ def _below(n, start, index, diagonal):
     for i in range(n):
         for p in range(start[i], diagonal[i]):
             begin[index[p] + 1] += 1
-    begin = np.cumsum(begin)
+    for i in range(n):
+        begin[i + 1] += begin[i]
     rows, free = np.empty(begin[n], np.int64), begin.copy()
     for i in range(n):
         for p in range(start[i], diagonal[i]):
@@ -232,8 +233,19 @@ def _depth_first(n, fill):
             top = _release(fill.column[p], waits, stack, top)
         for p in range(fill.below_start[k], fill.below_start[k + 1]):
             top = _release(fill.below[p], waits, stack, top)
-        stack[bottom:top] = np.sort(stack[bottom:top])[::-1]
+        _sort_descending(stack, bottom, top)
     return order
+
+
+@compiled
+def _sort_descending(x, begin, end):
+    """Sort x[begin:end], a few numbers, by insertion: numpy's sort takes seconds to compile."""
+    for i in range(begin + 1, end):
+        value, k = x[i], i
+        while k > begin and x[k - 1] < value:
+            x[k] = x[k - 1]
+            k -= 1
+        x[k] = value
 
 
 @compiled(makes_arrays=True)

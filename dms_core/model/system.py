@@ -76,7 +76,7 @@ class System:
             label = getattr(wanted, "__name__", "element")
             names = [e.name for e in self.everything() if isinstance(e, wanted)]
             problem = "does not exist" if found is None else f"is a {found.kind}"
-            raise ModelError(f"'{name}' {problem}; a {label} is wanted. Declared: {choices(names)}.")
+            raise ModelError(f"'{name}' {problem}. Expected the name of a {label}. Declared: {choices(names)}.")
         return found
 
     def body(self, name: str) -> Body | None:

@@ -63,16 +63,16 @@ class SolverOptions:
         for name in ("rtol", "h_max", "h_min", "newton_tol", "constraint_tol", "max_steps"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
-                raise InputError(f"solver option {name} = {value!r}; a positive number is wanted.")
+                raise InputError(f"solver option {name}: Expected a positive number, got {value!r}.")
         for name in ("atol", "fixed_step"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
-                raise InputError(f"solver option {name} = {value!r}; a positive number or None is wanted.")
+                raise InputError(f"solver option {name}: Expected a positive number or None, got {value!r}.")
         if self.method not in ("bdf2", "sdirk2"):
-            raise InputError(f"solver option method = {self.method!r}; 'bdf2' or 'sdirk2' is wanted.")
+            raise InputError(f"solver option method: Expected 'bdf2' or 'sdirk2', got {self.method!r}.")
 
     def numbers(self) -> Options:
-        """For compiled code."""
+        """The options as compiled code takes them."""
         return Options(
             float(self.rtol), float(self.atol or 0.0), float(self.fixed_step or 0.0), float(self.h_max),
             float(self.h_min), float(self.newton_tol), float(self.constraint_tol), int(self.max_steps),
@@ -126,10 +126,10 @@ class World(Inspection):
         signal = self.model.system.inputs[k].signal
         if not isinstance(signal, Constant):
             raise InputError(
-                f"input '{name}' is declared as a course in time ({signal.kind}); only a constant one can be set."
+                f"input '{name}' is declared as a function of time ({signal.kind}); only a constant input can be set."
             )
         if not math.isfinite(value):
-            raise InputError(f"input '{name}' = {value}; a finite number is wanted.")
+            raise InputError(f"input '{name}': Expected a finite number, got {value}.")
         self._hold(k, float(value))
 
     def _hold(self, k: int, value: float) -> bool:
@@ -148,7 +148,7 @@ class World(Inspection):
             SUCCESS, or what stopped the run: what was computed is kept and finite.
         """
         if not math.isfinite(t_end) or t_end < self.time:
-            raise InputError(f"t_end = {t_end} s; a time not before the present {self.time:.6g} s is wanted.")
+            raise InputError(f"t_end: Expected a time of at least the present {self.time:.6g} s, got {t_end} s.")
         try:
             code, stuck = self._advance(float(t_end), progress), -math.inf
             while code == OUTCOME.matrix_singular:
@@ -173,7 +173,7 @@ class World(Inspection):
         return code
 
     def _keep(self, rows: np.ndarray) -> None:
-        """What becomes of recorded steps: nothing here."""
+        """Take over recorded steps; a world that remembers the present only does nothing."""
 
     def reorder(self) -> bool:
         """Choose rows and pivots anew where the old ones became singular; False if nothing helps."""
@@ -300,7 +300,7 @@ def simulate(
         InputError: t_end is not positive, or an option is out of range.
     """
     if not (math.isfinite(t_end) and t_end > 0.0):
-        raise InputError(f"t_end = {t_end} s; a positive time is wanted.")
+        raise InputError(f"t_end: Expected a positive time, got {t_end} s.")
     simulation = Simulation(model, options)
     simulation.advance(t_end, progress)
     return simulation.trajectory()

@@ -8,7 +8,7 @@ from dms_core.linear.symbolic import LuTables
 LU = fields(LuTables)
 
 
-@compiled(makes_arrays=True, no_cpython_wrapper=True)
+@compiled(makes_arrays=True)
 def lu_tables(t):
     """The LuTables behind a packed table."""
     return LuTables(

@@ -157,9 +157,17 @@ MISTAKES = {
         ROD + "forces:\n  - {kind: gravity, name: rod}\n",
         r"model.yaml: the name 'rod' is used by a rigid_body and .*gravity; names must be unique",
     ),
-    "mapping for list": (ROD + "forces: {kind: gravity}\n", r"forces = \{'kind': 'gravity'\}: a list is wanted"),
+    "misspelt body": (
+        ROD + "constraints:\n  - {kind: revolute, name: hinge, body_j: rood}\n",
+        r"model.yaml, line 4: revolute 'hinge': body 'rood' does not exist\. Declared: ground, rod",
+    ),
+    "misspelt input": (
+        ROD + "forces:\n  - {kind: lumped_load, name: push, body: rod, input: pul}\n",
+        r"model.yaml, line 4: lumped_load 'push': input 'pul' does not exist",
+    ),
+    "mapping for list": (ROD + "forces: {kind: gravity}\n", r"forces: Expected a list .*got \{'kind': 'gravity'\}"),
     "text for mapping": (ROD + "forces: [gravity]\n", r"'gravity' is not a mapping with the keys 'kind' and 'name'"),
-    "number for name": ("name: 3\n" + ROD, r"name = 3: a text is wanted"),
+    "number for name": ("name: 3\n" + ROD, r"name: Expected a text, got 3"),
     "key twice": (ROD + "bodies: []\n", r"line 3, column 1 is not valid YAML: the key 'bodies' stands twice"),
     "broken YAML": ("bodies: [\n", r"line 2, column 1 is not valid YAML: while parsing a flow node"),
     "tab": ("bodies:\n\t- a\n", r"line 2, column 1 is not valid YAML: .*'\\t'"),
@@ -167,8 +175,8 @@ MISTAKES = {
         "bodies: !!python/object/apply:os.getcwd []\n",
         r"line 1.* is not valid YAML: could not determine",
     ),
-    "empty": ("", r"holds nothing; a mapping"),
-    "list": ("- a\n", r"holds a list; a mapping"),
+    "empty": ("", r"holds nothing\. Expected a mapping"),
+    "list": ("- a\n", r"holds a list\. Expected a mapping"),
 }
 
 

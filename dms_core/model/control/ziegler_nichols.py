@@ -151,7 +151,7 @@ def find_critical_gain(
         InputError: the gains do not bracket a sustained oscillation. A loop without delay or lag may have none.
     """
     if not 0.0 < kp_low < kp_high:
-        raise InputError(f"kp_low = {kp_low!r} and kp_high = {kp_high!r}: 0 < kp_low < kp_high is wanted.")
+        raise InputError(f"Expected 0 < kp_low < kp_high, got {kp_low!r} and {kp_high!r}.")
     trials: list[tuple[float, float]] = []
 
     def measured(kp: float) -> Oscillation:

@@ -61,7 +61,7 @@ class MuscleNumbers(NamedTuple):
     L0: int = 1
     Ls: int = 2
     height: int = 3
-    """Of the fibre across the tendon, L0 sin(alpha0) [m]."""
+    """Height of the fibre across the tendon, L0 sin(alpha0) [m]."""
     fastest: int = 4
     """Contraction velocity [m/s]."""
     activation_time: int = 5

@@ -110,7 +110,7 @@ class RopeSensor(Sensor):
             return replace(placed, integers=(*placed.integers, *codes), pattern=None)
         if rope is not None and not isinstance(rope, RopeLength):
             raise ModelError(
-                f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}; a rope_force or rope_length is wanted."
+                f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}. Expected a rope_force or rope_length."
             )
         table = path_table(system, rope.path if rope is not None else self.path or ())
         return Placement(

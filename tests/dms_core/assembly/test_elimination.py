@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from dms_core.model import (
     Steps,
     System,
 )
+from dms_core.model.element import Constraint
 from exo_env.ecosystem.arm import MUSCLES
 from exo_env.ecosystem.ecosystem import Ecosystem
 
@@ -189,6 +191,7 @@ def test_reactions_at_welds_of_a_swinging_arm():
         np.testing.assert_allclose(worlds[0].read(), worlds[1].read(), atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:.*drive more than the joints leave free")
 @pytest.mark.parametrize("what", ["driven", "all fixed", "none fixed"])
 def test_nothing_is_welded(what):
     height = Input(name="height", signal=Constant(value=0.3))
@@ -208,3 +211,30 @@ def test_nothing_is_welded(what):
     run = Simulation(model, OPTIONS)
     run.advance(0.05)
     assert run.trajectory().check().stats.steps > 0
+
+
+class _Glue(Constraint):
+    """A weld that is written outside the package: it knows nothing of Fixed but its kernel."""
+
+    kind: ClassVar[str] = "glue_of_a_test"
+    kernel: ClassVar = Fixed.kernel
+    body: str
+    known: bool = True
+
+    def rows(self) -> tuple[str, ...]:
+        return ("x", "y", "z", "a", "b", "c")
+
+    def welded(self) -> tuple[str, ...]:
+        return ("ground", self.body) if self.known else ()
+
+    def place(self, system):
+        return Fixed(name=self.name, body_j=self.body).place(system)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_weld_of_ones_own_is_left_out_if_it_says_so(known):
+    bodies = [RigidBody(name=name, mass=1.0, inertia=(0.1, 0.1, 0.1)) for name in ("base", "rod")]
+    joints = [_Glue(name="glue", body="base", known=known), Revolute(name="hinge", body_i="base", body_j="rod")]
+    model = Model(System("glued", bodies=bodies, constraints=joints))
+    assert len(model.welds.coordinates) == (7 if known else 0)
+    assert model.degrees_of_freedom == 1

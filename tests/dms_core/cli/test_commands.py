@@ -117,13 +117,13 @@ class TestRun:
     @pytest.mark.parametrize(
         ("option", "value", "message"),
         [
-            ("--rtol", 0, "--rtol 0.0: a positive number is wanted"),
-            ("--rtol", -1e-5, "--rtol -1e-05: a positive number is wanted"),
-            ("--rtol", "nan", "--rtol nan: a positive number is wanted"),
-            ("--t-end", 0, "--t-end 0.0: a positive time"),
-            ("--t-end", "inf", "--t-end inf: a positive time"),
-            ("--sample", -0.1, "--sample -0.1: a positive time"),
-            ("--step", 0, "--step 0.0: a positive number"),
+            ("--rtol", 0, "--rtol: Expected a positive number, got 0.0"),
+            ("--rtol", -1e-5, "--rtol: Expected a positive number, got -1e-05"),
+            ("--rtol", "nan", "--rtol: Expected a positive number, got nan"),
+            ("--t-end", 0, "--t-end: Expected a positive time [s], got 0.0"),
+            ("--t-end", "inf", "--t-end: Expected a positive time [s], got inf"),
+            ("--sample", -0.1, "--sample: Expected a positive time [s], got -0.1"),
+            ("--step", 0, "--step: Expected a positive number, got 0.0"),
         ],
     )
     def test_numbers_out_of_range(self, command, tmp_path, option, value, message):

@@ -8,7 +8,7 @@ from numba.core.runtime import _nrt_python, rtsys
 from scipy.sparse.linalg import splu
 
 from dms_core.errors import InputError
-from dms_core.linear.lu import assemble, factor, residual, solve, solve_transposed, storage
+from dms_core.linear.lu import assemble, factor, solve, solve_transposed, storage
 from dms_core.linear.ordering import SingularMatrixError, markowitz
 from dms_core.linear.symbolic import plan, symbolic
 from tests.dms_core.linear.chain_matrix import chain_newton_matrix
@@ -197,15 +197,6 @@ def test_lost_digits_show_in_the_ratio():
     tables = symbolic(2, rows, cols, np.array([0, 1]), np.array([0, 1]))
     _, (ratio, step) = solved(tables, np.array([1.0, 1.0, 1.0, 1.0 + e]), np.ones(2))
     assert step == 1 and ratio == e / (2.0 + e)
-
-
-def test_residual_and_refinement():
-    A = chain_newton_matrix(3)
-    rng = np.random.default_rng(2)
-    b, x, r = rng.standard_normal(A.shape[0]), rng.standard_normal(A.shape[0]), np.zeros(A.shape[0])
-    residual(A.row, A.col, A.data, b, x, r)
-    # Sums of 30 terms of size up to 1e3 in another order.
-    assert np.allclose(r, b - A @ x, rtol=0.0, atol=1e-11)
 
 
 def test_orders_that_cannot_be():

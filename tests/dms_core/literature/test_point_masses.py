@@ -139,6 +139,7 @@ CASES = {"free": (0.0, False), "under": (2.0, False), "critical": (20.0, False),
          "resonance": (1.0, True), "undamped_resonance": (0.0, True)}  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:.*read by no element")
 @pytest.mark.parametrize("case", CASES)
 def test_spring_and_mass(case):
     damping, driven = CASES[case]
@@ -153,6 +154,7 @@ def test_spring_and_mass(case):
         np.testing.assert_allclose(states.rate("mass.x"), rows[:, 2], atol=5e-5 * scale)
 
 
+@pytest.mark.filterwarnings("ignore:.*read by no element")
 @pytest.mark.parametrize("case", ["under", "resonance"])
 def test_generic_second_order_element_is_the_same_oscillator(case):
     damping, driven = CASES[case]

@@ -49,6 +49,7 @@ def test_newton_crosses_the_kink_of_the_force_velocity_curve(activation, excitat
     assert abs(run.q[-1, fibre] - exact.q[-1, fibre]) < 0.5 * h
 
 
+@pytest.mark.filterwarnings("ignore:.*read by no element")
 @pytest.mark.parametrize(
     "without", [(), ("biceps",), ("drum", "cable"), ("spring",), ("biceps", "drum", "cable", "pid")]
 )

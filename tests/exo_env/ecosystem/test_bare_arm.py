@@ -96,7 +96,7 @@ def test_a_wrong_table_is_named(tmp_path, capsys, text, message):
     [
         ("--t-end", "-1", "--t-end -1.0: expected a time above 0 s"),
         ("--sample", "0", "--sample 0.0: expected a time above 0 s"),
-        ("--rtol", "0", "rtol = 0.0"),
+        ("--rtol", "0", "rtol: Expected a positive number, got 0.0"),
         ("--start-activation", "0", "a number from 0.01 to 1"),
         ("--start-deg", "400", "--start-deg 400.0: expected an angle"),
     ],

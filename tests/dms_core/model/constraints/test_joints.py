@@ -193,5 +193,5 @@ class TestMistakes:
 
     def test_driver_needs_a_revolute_joint(self):
         drive = AngleDriver(name="drive", joint="ball", input="psi")
-        with pytest.raises(ModelError, match="'ball' is a spherical; a Revolute is wanted"):
+        with pytest.raises(ModelError, match="'ball' is a spherical. Expected the name of a Revolute"):
             kernel_calls(Example(pair(constraints=[Spherical(name="ball", **PAIR), drive], inputs=["psi"]), drive))

@@ -77,7 +77,11 @@ def test_gains_of_the_paper() -> None:
 
 @pytest.mark.parametrize(
     ("bracket", "message"),
-    [((20.0, 30.0), "already oscillates"), ((1.0, 5.0), "still decays"), ((5.0, 1.0), "is wanted")],
+    [
+        ((20.0, 30.0), "already oscillates"),
+        ((1.0, 5.0), "still decays"),
+        ((5.0, 1.0), "got 5.0 and 1.0"),
+    ],
 )
 def test_gains_that_bracket_nothing_are_refused(bracket: tuple, message: str) -> None:
     """Each mistake with what to change."""

@@ -48,7 +48,7 @@ def test_names_and_units():
 
 
 def test_mistakes_name_the_culprit():
-    with pytest.raises(ModelError, match=r"'base' is a rigid_body; a ThelenMuscle is wanted.*BRA"):
+    with pytest.raises(ModelError, match=r"'base' is a rigid_body. Expected the name of a ThelenMuscle.*BRA"):
         MuscleSensor(name="probe", muscle="base").place(arm(0.0, muscle("BRA")))
     with pytest.raises(ModelError, match="named twice"):
         MuscleSensor(name="probe", muscle="BRA", components=("activation", "activation"))
