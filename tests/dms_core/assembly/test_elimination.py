@@ -25,7 +25,7 @@ from dms_core.model import (
     System,
 )
 from dms_core.model.element import Constraint
-from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 
 G = 9.81
@@ -51,7 +51,7 @@ def ecosystem() -> System:
     return Ecosystem().system(
         start,
         MinimumJerk(times=(0.0, 0.4), values=(start, end)),
-        {m: Steps(times=(0.0, 0.1), values=(0.01, 0.3)) for m in MUSCLES},
+        {m: Steps(times=(0.0, 0.1), values=(0.01, 0.3)) for m in Arm().muscles},
     )
 
 

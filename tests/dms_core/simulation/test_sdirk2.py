@@ -12,7 +12,7 @@ from dms_core.assembly.residual import evaluate_inputs, evaluate_residual
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError
 from dms_core.model import Input, LumpedLoad, MinimumJerk, Steps
-from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 from tests.dms_core.literature.chain import chain
 
@@ -112,7 +112,7 @@ def test_rates_behind_a_jump_solve_the_equations():
         Ecosystem().system(
             start,
             MinimumJerk(times=(0.0, 0.4), values=(start, end)),
-            {m: Steps(times=(0.0, 0.1), values=(0.01, 0.3)) for m in MUSCLES},
+            {m: Steps(times=(0.0, 0.1), values=(0.01, 0.3)) for m in Arm().muscles},
             device_inputs=[Input(name="assistance", signal=Steps(times=(0.0, 0.1, 0.15), values=(1.0, 0.3, 0.8)))],
         )
     )

@@ -25,7 +25,7 @@ def test_the_shipped_file_is_read_as_it_is():
         (("roles", "flexors"), "BIClong", "roles: RoleFacts: flexors = 'BIClong'"),
         (("roles", "flexors"), ["biceps"], "roles: flexors = 'biceps'; expected one of the muscles BIClong"),
         (("roles", "forearm"), "ulna", "roles: forearm = 'ulna'; expected one of the bodies base"),
-        (("gravity",), [0.0, -9.8], "gravity.2"),
+        (("gravity",), [0.0, -9.8], "gravity = [0.0, -9.8]: Expected 3 items, got 2"),
         (("bodies", "r_humerus", "mass"), None, "bodies.r_humerus: BodyFacts: 'mass' is missing"),
         (("bodies", "r_humerus", "mass"), -1.0, "bodies.r_humerus: BodyFacts: mass = -1.0"),
         (("joints", "r_elbow", "axis_i"), None, "joints.r_elbow: 'axis_i' is missing"),
