@@ -284,15 +284,16 @@ class AssistanceEnv(gymnasium.Env):
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
         # Until the period is done to its end: what breaks it off leaves nothing to step.
         self._over = True
-        if run_period(self.world.packed.table, used) != DONE:
+        world = self.world
+        if run_period(world.packed.table, used) != DONE:
             self.rescue()
-        status = self.world.tables.status
-        terminated, truncated = bool(status[STATUS.event] != NOTHING), bool(status[STATUS.step] == self.steps)
+        status = world.tables.status.tolist()
+        terminated, truncated = status[STATUS.event] != NOTHING, status[STATUS.step] == self.steps
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
-        info = self.readout.info(self._weights, self.happened())
-        return self._observation(), float(self.world.tables.task.reward[0]), terminated, truncated, info
+        info = self.readout.info(self._weights, self.happened() if terminated else None)
+        return self._observation(), world.tables.task.reward.item(), terminated, truncated, info
 
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may need another order of elimination."""

@@ -13,7 +13,6 @@ from gymnasium.vector.utils import batch_space
 
 from dms_core.errors import InputError, choices
 from exo_env.envs.base_env import AssistanceEnv
-from exo_env.tasks.channels import first_places
 from exo_env.tasks.task import NOTHING, SOLVER, Task
 from exo_env.world.batch import Batch
 from exo_env.world.episode import Episode
@@ -67,7 +66,8 @@ class AssistanceVectorEnv(VectorEnv):
         self.observation_space = batch_space(one.observation_space, self.num_envs)
         self.action_space = batch_space(one.action_space, self.num_envs)
         self._task: Task = one.task
-        self._batch = Batch(self.num_envs, one.observer.size, len(one.task.terms), _reported_places(one.task), threads)
+        places = np.array([place for _, place, _ in one.task.reported_places], np.int64)
+        self._batch = Batch(self.num_envs, one.observer.size, len(one.task.terms), places, threads)
         self._over = np.ones(self.num_envs, bool)
         self._episodes: list[Episode | None] = [None] * self.num_envs
         self._started = False
@@ -266,9 +266,3 @@ class AssistanceVectorEnv(VectorEnv):
 
 GROUPED = ("reward_terms", "reward_weights")
 """Keys of a step's infos that hold one number for each world and reward term."""
-
-
-def _reported_places(task: Task) -> np.ndarray:
-    """Place of each reading that infos have."""
-    names, first = [reading.name for reading in task.readings], first_places(task.readings)
-    return np.array([first[names.index(number.reading)] for number in task.reported], np.int64)

@@ -30,7 +30,7 @@ import numpy as np
 from dms_core.kernels import floats, inner, ints
 from exo_env.jit import compiled
 from exo_env.settings import Settings
-from exo_env.tasks.channels import Channel, Parts, Reading, Slice
+from exo_env.tasks.channels import Channel, Parts, Reading, Slice, first_places
 from exo_env.tasks.movement import Movement
 from exo_env.world.tables import STATUS, TASK, WORLD
 
@@ -80,8 +80,15 @@ class Task(ABC):
     ) -> None:
         self.parts = parts
         self.weights, self.limits = self.weights_type(**(weights or {})), self.limits_type(**(limits or {}))
+        self.terms = tuple(type(self.weights).model_fields)
+        """Names of the reward terms."""
         self.readings = self.declared_readings(parts)
         self.groups = self.declared_groups(parts)
+        ends = first_places(self.readings).tolist()
+        self.places = {r.name: slice(*ends[k : k + 2]) for k, r in enumerate(self.readings)}
+        """Where the components of each reading stand in the array of all."""
+        self.reported_places = tuple((x.name, self.places[x.reading].start, x.factor) for x in self.reported)
+        """Name of each reported number, place of its reading, and factor."""
 
     @abstractmethod
     def declared_readings(self, parts: Parts) -> list[Reading]:
@@ -103,11 +110,6 @@ class Task(ABC):
     def start_range(self) -> tuple[float, float]:
         """Elbow angles at which an episode may begin [deg]."""
         return 0.0, 142.0
-
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """Names of the reward terms."""
-        return tuple(type(self.weights).model_fields)
 
     def numbers(self) -> np.ndarray:
         """Numbers that the kernels read beside the readings: here those of the limits, shape (n,)."""

@@ -26,13 +26,10 @@ class Readout:
 
     def __init__(self, world: PatientWorld, episode: Episode) -> None:
         self.world, self.episode = world, episode
-        self._places = {r.name: (k, len(r.labels)) for k, r in enumerate(world.task.readings)}
 
     def __call__(self, name: str) -> np.ndarray:
         """Components of a reading of the task, by its name."""
-        k, count = self._places[name]
-        first = self.world.tables.task.first[k]
-        return self.world.tables.task.readings[first : first + count].copy()
+        return self.world.tables.task.readings[self.world.task.places[name]].copy()
 
     def number(self, name: str) -> float:
         """A reading of one component, by its name."""
@@ -98,13 +95,13 @@ class Readout:
             weights: weight of each reward term.
             happened: sentence on what ended the episode, None where nothing has.
         """
-        task, tables = self.world.task, self.world.tables
+        task, tables, status = self.world.task, self.world.tables.task, self.world.tables.status.tolist()
         info: dict[str, Any] = {
-            "reward_terms": dict(zip(task.terms, tables.task.terms.tolist(), strict=True)),
+            "reward_terms": dict(zip(task.terms, tables.terms.tolist(), strict=True)),
             "reward_weights": weights.copy(),
-            "time": float(self.world.times[tables.status[STATUS.step]]),
-            **{x.name: x.factor * self.number(x.reading) for x in task.reported},
-            "solver_failed": bool(tables.status[STATUS.event] == SOLVER),
+            "time": self.world.times.item(status[STATUS.step]),
+            **{name: factor * tables.readings.item(k) for name, k, factor in task.reported_places},
+            "solver_failed": status[STATUS.event] == SOLVER,
         }
         if happened is not None:
             info["event"] = happened
