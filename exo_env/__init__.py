@@ -15,9 +15,9 @@ Importing it registers the environments with Gymnasium and loads nothing else; t
 from gymnasium.envs.registration import register
 
 from dms_core.renamed import moved_modules
-from exo_env.old_names import MOVED
+from exo_env.old_names import MOVED, NAMES
 
-moved_modules("exo_env", MOVED)
+moved_modules("exo_env", MOVED, NAMES)
 
 # Gymnasium's passive checker takes a first reset that raised for done, and breaks at the next step; the environment
 # checks its arguments itself.

@@ -28,7 +28,7 @@ WIDTH = 79
 """Characters of the line on a terminal."""
 CALLED = "_called"
 """End of the name under which a function is compiled for callers that are compiled themselves."""
-SHAPING = (b"@compiled", b"NamedTuple")
+SHAPING = (b"@compiled", b"NamedTuple", b"places(", b"trait(")
 """What a source holds that shapes compiled code: functions, or the places of what they read."""
 LAYOUT = ("assembly", "compiled")
 """Folders all of whose sources count, whether they hold such a thing or not."""
