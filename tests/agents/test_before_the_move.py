@@ -121,7 +121,7 @@ def test_names_that_are_gone_say_what_replaces_them(module, name, said):
     import importlib
 
     pytest.importorskip("stable_baselines3")
-    with pytest.raises(AttributeError, match=f"It is now {said}"):
+    with pytest.raises(ImportError, match=f"It is now {said}"):
         getattr(importlib.import_module(module), name)
 
 
