@@ -1,6 +1,6 @@
 """What a reset sets to zero: every array that is declared as cleared, so that no reset can forget one.
 
-Arrays of a world stand in NamedTuples (world/tables.py). Each field says whether its array is `Kept`, made with the
+Arrays of a world stand in NamedTuples (exo_env/tables.py). Each field says whether its array is `Kept`, made with the
 environment or filled before a reset reads it, or `Cleared`, set to zero at each reset before anything is put into it.
 """
 

@@ -6,7 +6,7 @@ A kernel is a compiled function of one packed world w, decorated with `compiled`
     action, wanted = floats(drive, DRIVE.action), floats(drive, DRIVE.wanted)
 
 and, in a task, `readings(w)`, `first_of(w)`, `terms_of(w)`, `task_numbers(w)`, `step_of(w)` and `end_with(w, code)`.
-All tables and their fields are in exo_env/world/tables.py. numba keeps the machine code beside the file; it compiles
+All tables and their fields are in exo_env/tables.py. numba keeps the machine code beside the file; it compiles
 anew when that file changes, but not when one changes that its constants come from: `drop_stale_code(folder)` of
 dms_core.kernels, called in the package's own __init__, sees to that.
 """
@@ -14,19 +14,7 @@ dms_core.kernels, called in the package's own __init__, sees to that.
 from dms_core.kernels import drop_stale_code, flags, floats, inner, ints, matrix
 from exo_env.jit import compiled
 from exo_env.places import places
-from exo_env.tasks.task import (
-    FIRST_EVENT,
-    NOTHING,
-    SOLVER,
-    end_with,
-    event_of,
-    first_of,
-    readings,
-    step_of,
-    task_numbers,
-    terms_of,
-)
-from exo_env.world.tables import (
+from exo_env.tables import (
     DRAW,
     DRIVE,
     DYNAMICS,
@@ -38,6 +26,18 @@ from exo_env.world.tables import (
     STATUS,
     TASK,
     WORLD,
+)
+from exo_env.tasks.task import (
+    FIRST_EVENT,
+    NOTHING,
+    SOLVER,
+    end_with,
+    event_of,
+    first_of,
+    readings,
+    step_of,
+    task_numbers,
+    terms_of,
 )
 
 __all__ = [

@@ -28,7 +28,7 @@ MOVED = {
     "orderings": "paper.statements",
     "panels": "rendering.panels",
     "picture": "rendering.picture",
-    "plant": "world.tables",
+    "plant": "tables",
     "population": "patient.population",
     "readout": "world.readout",
     "repetition": "tasks.movement",
@@ -46,9 +46,7 @@ MOVED = {
     "vector_env": "envs.vector_env",
 }
 
-_KERNEL = (
-    "Compiled code is written with exo_env.kernels now: tables in small tuples by owner (exo_env/world/tables.py)."
-)
+_KERNEL = "Compiled code is written with exo_env.kernels now: tables in small tuples by owner (exo_env/tables.py)."
 _MUSCLES = "Muscles come from the arm: exo_env.ecosystem.arm.Arm().muscles, .signs."
 _ROPES = "Ropes come from the device: Exoskeleton.ropes, .lifting_rope, .lowering_rope."
 _READINGS = "Readings and channels are declared by a task: exo_env.tasks.channels, exo_env.tasks.lift."

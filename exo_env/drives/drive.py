@@ -26,7 +26,7 @@ from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.jit import compiled
 from exo_env.settings import Settings
-from exo_env.world.tables import DRIVE, WORLD
+from exo_env.tables import DRIVE, WORLD
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,7 @@ from exo_env.envs.settings import (
 )
 from exo_env.patient.population import population
 from exo_env.rendering.scene import Scene
+from exo_env.tables import STATUS
 from exo_env.tasks.channels import Parts, Slice
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
@@ -54,7 +55,6 @@ from exo_env.tasks.task import NOTHING, Task
 from exo_env.world.control_period import finish, run_period
 from exo_env.world.episode import Episode
 from exo_env.world.readout import Readout
-from exo_env.world.tables import STATUS
 from exo_env.world.world import PatientWorld
 
 TRANSIENT = ("_episode", "_readout", "_renderer", "world")

@@ -14,8 +14,8 @@ from gymnasium.envs.registration import load_env_creator
 
 from dms_core.errors import InputError, choices
 from exo_env.envs.base_env import AssistanceEnv
+from exo_env.tables import STATUS
 from exo_env.tasks.task import FIRST_EVENT, NOTHING, SOLVER
-from exo_env.world.tables import STATUS
 
 DEFAULT = "exo/ElbowLift-v1"
 

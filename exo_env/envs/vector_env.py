@@ -13,11 +13,11 @@ from gymnasium.vector.utils import batch_space
 
 from dms_core.errors import InputError, choices
 from exo_env.envs.base_env import AssistanceEnv
+from exo_env.tables import STATUS
 from exo_env.tasks.task import NOTHING, SOLVER, Task
 from exo_env.world.batch import Batch
 from exo_env.world.episode import Episode
 from exo_env.world.reset import BEGUN
-from exo_env.world.tables import STATUS
 
 EPISODE = attrgetter("_episode")
 """Gives the episode of an environment, None where there is none: cheaper than the property, which raises."""

@@ -14,9 +14,9 @@ from exo_env.jit import compiled
 from exo_env.patient.effort import PRESENT
 from exo_env.patient.slacking import MOST_EFFORT
 from exo_env.places import places
+from exo_env.tables import DRAW, DRIVE, EFFORT, GIVEN, PATIENT_TABLES, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading, trait_channels, trait_readings
 from exo_env.tasks.task import first_of, readings, step_of
-from exo_env.world.tables import DRAW, DRIVE, EFFORT, GIVEN, PATIENT_TABLES, PLAN, WORLD
 
 
 def elbow_readings(parts: Parts) -> list[Reading]:

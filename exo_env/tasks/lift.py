@@ -9,6 +9,7 @@ from dms_core.kernels import floats, inner, matrix
 from exo_env.jit import compiled
 from exo_env.places import places
 from exo_env.settings import Settings
+from exo_env.tables import DRIVE, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Parts, Reading
 from exo_env.tasks.elbow import (
     ELBOW,
@@ -36,7 +37,6 @@ from exo_env.tasks.task import (
     task_numbers,
     terms_of,
 )
-from exo_env.world.tables import DRIVE, PLAN, WORLD
 
 PREVIEW = (0.1, 0.2, 0.4)
 """How far ahead the reference is shown [s]; assumed."""

@@ -26,7 +26,7 @@ from exo_env.jit import compiled
 from exo_env.patient.distributions import Distribution, Draws, distribution
 from exo_env.places import places
 from exo_env.settings import Settings
-from exo_env.world.tables import PLAN, WORLD
+from exo_env.tables import PLAN, WORLD
 
 START = "start_deg"
 """Name of the number that every movement has first: the elbow angle at the start [deg]."""

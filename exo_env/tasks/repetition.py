@@ -18,9 +18,9 @@ from dms_core.model import MinimumJerk
 from exo_env.jit import compiled
 from exo_env.places import places
 from exo_env.settings import Settings
+from exo_env.tables import PLAN, WORLD
+from exo_env.tasks.course import course_of
 from exo_env.tasks.movement import Movement
-from exo_env.world.course import course_of
-from exo_env.world.tables import PLAN, WORLD
 
 LOWEST, HIGHEST = 20.0, 100.0
 """Elbow angles between which the exercise stays [deg]."""

@@ -2,7 +2,7 @@
 
 A task is a class in one file. It declares its reward terms (the fields of `weights_type`), what ends an episode
 (`limits_type`, `events`), the movement that the patient intends, its readings and the groups of channels that show
-them, and two compiled kernels, functions of a packed world w (world/tables.py), which the batch calls by address:
+them, and two compiled kernels, functions of a packed world w (exo_env/tables.py), which the batch calls by address:
 
     read(w)      fills the derived readings of the present control time, behind those that sensors give
     judge(w)     fills the value of each term, and sets the event that ends the episode, if there is one
@@ -30,9 +30,9 @@ import numpy as np
 from dms_core.kernels import floats, inner, ints
 from exo_env.jit import compiled
 from exo_env.settings import Settings
+from exo_env.tables import STATUS, TASK, WORLD
 from exo_env.tasks.channels import Channel, Parts, Reading, Slice, first_places
 from exo_env.tasks.movement import Movement
-from exo_env.world.tables import STATUS, TASK, WORLD
 
 NOTHING, SOLVER, FIRST_EVENT = range(3)
 """Codes of what ended an episode: nothing, a solver that failed, and the first event of the task's own."""

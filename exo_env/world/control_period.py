@@ -25,9 +25,7 @@ from dms_core.kernels import (
 )
 from exo_env.jit import compiled
 from exo_env.patient.effort import EffortState, step_effort
-from exo_env.tasks.noise import imperfect
-from exo_env.tasks.task import SOLVER
-from exo_env.world.tables import (
+from exo_env.tables import (
     DRIVE,
     DYNAMICS,
     EFFORT,
@@ -39,6 +37,8 @@ from exo_env.world.tables import (
     TASK,
     WORLD,
 )
+from exo_env.tasks.noise import imperfect
+from exo_env.tasks.task import SOLVER
 
 
 @compiled

@@ -14,8 +14,8 @@ from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.patient.ability import Need
 from exo_env.patient.effort import PRESENT
 from exo_env.patient.patient import Patient
+from exo_env.tables import WorldTables
 from exo_env.world.draw import Draw
-from exo_env.world.tables import WorldTables
 from exo_env.world.world import PatientWorld
 
 

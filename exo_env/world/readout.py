@@ -9,10 +9,10 @@ import numpy as np
 
 from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.patient.patient import fields_of
+from exo_env.tables import STATUS
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.task import NOTHING, SOLVER
 from exo_env.world.episode import Episode
-from exo_env.world.tables import STATUS
 from exo_env.world.world import PatientWorld
 
 

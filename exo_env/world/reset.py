@@ -38,12 +38,7 @@ from exo_env.patient.motor_command import SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
 from exo_env.patient.static_optimisation import ArmTable, LoadTable, interpolated, muscle_moment, needed_moment, planned
 from exo_env.streams import fill_normals
-from exo_env.tasks.noise import IMPERFECTION
-from exo_env.world.control_period import begin, effort_of, options_of
-from exo_env.world.course import course_of
-from exo_env.world.rest_pose import put_rest
-from exo_env.world.scaling import put_numbers
-from exo_env.world.tables import (
+from exo_env.tables import (
     DRAW,
     DRIVE,
     DYNAMICS,
@@ -58,6 +53,11 @@ from exo_env.world.tables import (
     TASK,
     WORLD,
 )
+from exo_env.tasks.course import course_of
+from exo_env.tasks.noise import IMPERFECTION
+from exo_env.world.control_period import begin, effort_of, options_of
+from exo_env.world.rest_pose import put_rest
+from exo_env.world.scaling import put_numbers
 
 STILL, BESIDE = 1e-9, 2
 """Rate of psi below which it rests [rad/s]; samples planned on either side of a movement."""

@@ -15,7 +15,7 @@ from exo_env.ecosystem.gym_machine import handle_angle
 from exo_env.jit import compiled
 from exo_env.patient.static_optimisation import path_geometry
 from exo_env.places import places
-from exo_env.world.tables import DRIVE, REST, SUBJECT, WORLD
+from exo_env.tables import DRIVE, REST, SUBJECT, WORLD
 
 MOVING = places(("forearm", "lower_link", "handle", "weight", "pid"))
 """What moves, in the order of `RestTables.places`: four bodies, by their first coordinate, and the controller."""

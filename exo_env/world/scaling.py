@@ -35,8 +35,8 @@ from exo_env.jit import compiled
 from exo_env.patient.motor_command import arm_table
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.places import places
+from exo_env.tables import DRAW, GIVEN, SCALING, WORLD
 from exo_env.traits import range_of
-from exo_env.world.tables import DRAW, GIVEN, SCALING, WORLD
 
 TEMPLATE_ANGLE = 1.0
 """Elbow angle at which the elimination orders are chosen [rad], amid the exercise."""

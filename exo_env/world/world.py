@@ -27,15 +27,7 @@ from exo_env.patient.effort import new_effort
 from exo_env.patient.motor_command import arm_table, load_table, unsettled
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.streams import stream
-from exo_env.tasks.channels import first_places
-from exo_env.tasks.movement import Movement
-from exo_env.tasks.observer import Observer
-from exo_env.tasks.task import Task
-from exo_env.world.draw import Draw
-from exo_env.world.episode_code import EPISODE_CODE
-from exo_env.world.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
-from exo_env.world.scaling import TEMPLATE_ANGLE, declared, scaling_of
-from exo_env.world.tables import (
+from exo_env.tables import (
     FELT,
     GIVEN,
     OUTCOME,
@@ -52,6 +44,14 @@ from exo_env.world.tables import (
     TaskTables,
     WorldTables,
 )
+from exo_env.tasks.channels import first_places
+from exo_env.tasks.movement import Movement
+from exo_env.tasks.observer import Observer
+from exo_env.tasks.task import Task
+from exo_env.world.draw import Draw
+from exo_env.world.episode_code import EPISODE_CODE
+from exo_env.world.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
+from exo_env.world.scaling import TEMPLATE_ANGLE, declared, scaling_of
 
 compile_beside_models(EPISODE_CODE)
 
