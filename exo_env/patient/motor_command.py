@@ -38,9 +38,10 @@ INTERVAL = 0.02
 """Time between samples of the command [s]; far below the time constants of muscles and the movement."""
 SWEEPS = 100
 """Largest number of iterations between tendon strain and activation."""
-RELAXATION = 0.3
-"""Share of the new tendon force that an iteration takes over (all of it in the first): a soft tendon answers to force
-more than one to one, and from 0.4 on neighbours in time, 0.02 s apart, excite each other through the velocity."""
+RELAXATION, RELAXATION_APART = 0.3, 0.6
+"""Share of the new tendon force that an iteration takes over (all of it in the first), for samples INTERVAL apart and
+for samples 0.05 s apart or more. A soft tendon answers to force more than one to one, and from 0.4 on neighbours in
+time, INTERVAL apart, excite each other through the velocity; those further apart do not."""
 SETTLED = 1e-4
 """Estimated error in an activation below which the iteration has settled [-]."""
 

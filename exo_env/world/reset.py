@@ -34,7 +34,7 @@ from exo_env.ecosystem.gym_machine import clearances
 from exo_env.jit import compiled
 from exo_env.patient.ability import put_lacking
 from exo_env.patient.effort import reset_effort, start_excitation
-from exo_env.patient.motor_command import SETTLED, SWEEPS
+from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
 from exo_env.patient.static_optimisation import ArmTable, LoadTable, interpolated, muscle_moment, needed_moment, planned
 from exo_env.streams import fill_normals
@@ -61,9 +61,6 @@ from exo_env.world.scaling import put_numbers
 
 STILL, BESIDE = 1e-9, 2
 """Rate of psi below which it rests [rad/s]; samples planned on either side of a movement."""
-RELAXATION = 0.6
-"""Share of the new tendon force that an iteration of the plan takes over: twice that of motor_command.py, since samples
-PLANNING apart (world.py) do not excite each other."""
 FIRST_STEP = 0.5
 """First step tried in an episode, over the control period: inputs leave rest along straight lines of that length."""
 CLOSED = 1e-10
@@ -165,7 +162,7 @@ def put_command(w, arm, load):
             count += 1
         row[k] = max(count - 1, 0)
     moment, activations = np.empty(count), np.empty((count, arm.sign.shape[0]))
-    _, left = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION, SETTLED, moment, activations)
+    _, left = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION_APART, SETTLED, moment, activations)
     wanted = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted)
     interpolated(activations, row, times[1], floats(w, WORLD.period)[0], wanted)
     return left

@@ -28,7 +28,7 @@ import numpy as np
 from dms_core import Model, Simulation, SolverOptions, System
 from dms_core.model import Revolute, ThelenMuscle
 from dms_core.model.signals import Constant
-from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.bare_arm import bare_arm
 from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
 from tests.benchmarks import csv_file
@@ -41,6 +41,7 @@ STEP, WARM = 1e-3, 0.02
 STEEPEST, FLAT, WARM_ROWS = 1.1, 16, 5
 """Slope allowed; number of different patients; control periods before the clock starts."""
 MODE = "pid_setpoint"
+MUSCLES = Arm().muscles
 Row = tuple[str, int, float, float, float]
 """What, size, us a step, us a step and piece, slope from the size before."""
 

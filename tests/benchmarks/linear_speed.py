@@ -1,15 +1,19 @@
 """Speed of the compiled LU on Newton matrices of hinged chains, beside SuperLU and dense LAPACK in the same run.
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.linear_speed [links ...]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/linear_speed.py [links ...]
 
 Medians of repetitions, caches warm. The first factorisation after other work takes somewhat longer.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 import scipy.linalg as la
@@ -97,8 +101,13 @@ def report(links: int) -> str:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "links", nargs="*", type=int, default=(1, 2, 4, 8, 16, 32, 64, 128, 256), help="links of a chain"
+    )
+    lengths = parser.parse_args().links
     print("links      n     nnz    fill  mult-add  updates  plan/s  assemble    factor     solve  solve^T"
           "   SuperLU     solve    LAPACK     solve   [us]")  # fmt: skip
     report(1)
-    for links in map(int, sys.argv[1:] or (1, 2, 4, 8, 16, 32, 64, 128, 256)):
+    for links in lengths:
         print(report(links), flush=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dms_core import Model, Simulation, System
 from dms_core.model import Constant, Gravity, Revolute, RigidBody
-from exo_env.ecosystem.arm import MUSCLES
+from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.bare_arm import bare_arm
 from exo_env.paper.scenarios import build, load_scenarios
 from tests.benchmarks.chain_reference import TIP
@@ -52,7 +52,7 @@ def chain_gap(simulation: Simulation) -> float:
 def arm(task: str) -> Model:
     """arm26 alone, elbow free, six muscles."""
     start, excitations = ARM_TASKS[task]
-    return Model(bare_arm(start, {m: Constant(value=excitations[m[:3]]) for m in MUSCLES}, START_ACTIVATION))
+    return Model(bare_arm(start, {m: Constant(value=excitations[m[:3]]) for m in Arm().muscles}, START_ACTIVATION))
 
 
 def whole_system() -> tuple[Model, float]:
