@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from dms_core.errors import AssemblyError, DmsError, InputError, ModelError, SimulationError
     from dms_core.model.system import System
     from dms_core.results import Result, SolveStats, States, Trajectory
-    from dms_core.simulation.dynamics import Simulation, SolverOptions, World, simulate
+    from dms_core.simulation.dynamics import Simulation, World, simulate
+    from dms_core.simulation.options import SolverOptions
 
 moved_modules("dms_core", MOVED)
 
@@ -51,7 +52,8 @@ _MODULES = {
     "assembly.model": ("Model",),
     "model.system": ("System",),
     "results": ("Result", "SolveStats", "States", "Trajectory"),
-    "simulation.dynamics": ("Simulation", "SolverOptions", "World", "simulate"),
+    "simulation.dynamics": ("Simulation", "World", "simulate"),
+    "simulation.options": ("SolverOptions",),
 }
 """Where each public name is declared; it is loaded when it is first asked for, so that the import is quick."""
 

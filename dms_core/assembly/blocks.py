@@ -16,12 +16,13 @@ r4 that per second.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from dms_core.assembly.input_derivatives import InputDerivatives
+from dms_core.assembly.layout import Layout
 from dms_core.assembly.local import (
     add_constraint_forces,
     add_dynamic_rows,
@@ -32,16 +33,13 @@ from dms_core.assembly.local import (
     views,
 )
 from dms_core.assembly.scatter import scatter_constraint_blocks, scatter_dynamic_blocks, scatter_projection_block
-from dms_core.assembly.sensing import Partials, evaluate_partials, evaluate_sensors
+from dms_core.assembly.sensing import Partials, Sensing, evaluate_partials, evaluate_sensors
 from dms_core.assembly.sparsity import Slots, block_pattern
 from dms_core.assembly.tables import WORK, Work
 from dms_core.compiled.arena import Packed, fields, floats, matrix
 from dms_core.compiled.calls import call_entry
 from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError
-
-if TYPE_CHECKING:
-    from dms_core.assembly.model import Model
 
 
 class OperatingPoint(NamedTuple):
@@ -202,25 +200,31 @@ class _Compressed:
 class Derivatives:
     """Residual, sensors and their derivatives of one model; made when they are first asked for.
 
-    One caller at a time: the work arrays of the model's sensors are used.
+    One caller at a time: the work arrays of `sensing` are used.
+
+    Args:
+        layout: indices of the system's elements.
+        sensing: a packed Sensing of that layout; numbers written into its tables later are read.
     """
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        pattern, slots = block_pattern(model.layout)
+    def __init__(self, layout: Layout, sensing: Packed) -> None:
+        self._layout = layout
+        self._packed_sensing = sensing
+        self._sensing: Sensing = sensing.values
+        pattern, slots = block_pattern(layout)
         self._pattern = Packed(pattern)
-        n, m = model.n_q, model.n_phi
+        n, m = layout.n_q, layout.n_phi
         self._csr = {name: _Compressed(s, (m if name in ("G", "W") else n, n)) for name, s in slots.items()}
         self._values = Packed(_Values(*(np.zeros(self._csr[name].size) for name in _Values._fields)))
-        self.inputs = InputDerivatives(model)
+        self.inputs = InputDerivatives(layout, sensing)
 
     def put(self, point: OperatingPoint) -> Work:
-        """The point into the model's work arrays, checked; gives them.
+        """The point into the work arrays, checked; gives them.
 
         Raises:
             InputError: a part of the point has a wrong shape, or is not finite.
         """
-        n, m, n_u = self._model.n_q, self._model.n_phi, len(self._model.layout.input_index)
+        n, m, n_u = self._layout.n_q, self._layout.n_phi, len(self._layout.input_index)
         shapes = {"q": (n,), "qdot": (n,), "v": (n,), "a": (n,), "lam": (m,), "mu": (m,), "u": (n_u, 3)}
         for name, shape in shapes.items():
             value = np.asarray(getattr(point, name), float)
@@ -229,7 +233,7 @@ class Derivatives:
             if not np.isfinite(value).all():
                 where = tuple(map(int, np.argwhere(~np.isfinite(value))[0]))
                 raise InputError(f"operating point: expected finite numbers, got {name}{list(where)} = {value[where]}.")
-        w = self._model.sensing.values.work.values
+        w = self._sensing.work.values
         w.q[:n], w.v[:n], w.a[:n], w.lam[:], w.mu[:], w.u[:] = (
             point.q, point.v, point.a, point.lam, point.mu, point.u
         )  # fmt: skip
@@ -237,12 +241,12 @@ class Derivatives:
 
     def blocks(self, point: OperatingPoint) -> Blocks:
         """Residual and its derivatives at the point."""
-        w, sensing, values = self.put(point), self._model.sensing.values, self._values.values
+        w, sensing, values = self.put(point), self._sensing, self._values.values
         evaluate_blocks(
             sensing.dynamics.table, sensing.constraints.table, self._pattern.table, sensing.work.table,
             self._values.table,
         )  # fmt: skip
-        n, csr = self._model.n_q, self._csr
+        n, csr = self._layout.n_q, self._csr
         r1, r2 = point.v - point.qdot - w.gmu[:n], w.r2[:n].copy()
         r3, r4 = w.phi.copy(), w.phi_v.copy()
         r2_u, r3_u, r4_u = self.inputs.of_residual()
@@ -256,14 +260,14 @@ class Derivatives:
         """Sensors and their derivatives at the point."""
         w = self.put(point)
         partials = self.partials()
-        n_y = len(self._model.layout.outputs)
-        evaluate_sensors(self._model.sensing.table)
+        n_y = len(self._layout.outputs)
+        evaluate_sensors(self._packed_sensing.table)
         u = self.inputs.of_moments()
         u[:, :, 0] += partials.u
-        n = self._model.n_q
+        n = self._layout.n_q
         return SensorBlocks(
             w.y.copy(), partials.q[:, :n], partials.v[:, :n], partials.a[:, :n], partials.lam,
-            np.zeros((n_y, self._model.n_phi)), u, self.inputs.differenced,
+            np.zeros((n_y, self._layout.n_phi)), u, self.inputs.differenced,
         )  # fmt: skip
 
     def partials(self) -> Partials:
@@ -271,8 +275,8 @@ class Derivatives:
 
         What inputs do through the elements that a sensor sums is not in u; see InputDerivatives.of_moments.
         """
-        sensing, layout, n = self._model.sensing.values, self._model.layout, self._model.n_q
-        shapes = (n + 7, n + 7, n + 7, self._model.n_phi, len(layout.input_index))
+        sensing, layout, n = self._sensing, self._layout, self._layout.n_q
+        shapes = (n + 7, n + 7, n + 7, layout.n_phi, len(layout.input_index))
         into = Partials(*(np.zeros((len(layout.outputs), k)) for k in shapes))
         evaluate_partials(
             sensing.dynamics.table, sensing.constraints.table, sensing.sensors.table, sensing.composed.table,

@@ -13,20 +13,16 @@ phi = g(q) + s(u), what it writes into phi_t is linear in the rates and quadrati
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from dms_core.assembly.layout import Call
+from dms_core.assembly.layout import Call, Layout
 from dms_core.assembly.local import clear, gather, views
+from dms_core.assembly.sensing import Sensing
 from dms_core.compiled.arena import Packed, matrix
 from dms_core.compiled.calls import call_entry
 from dms_core.compiled.entries import SLOPES, Slopes, derivative_addresses
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import INPUT_DERIVATIVE, MOMENT
-
-if TYPE_CHECKING:
-    from dms_core.assembly.model import Model
 
 STEP = float(np.finfo(float).eps) ** (1.0 / 3.0)
 """Difference step over the size of what is changed, 6e-6: truncation and rounding of a central difference are then both
@@ -102,15 +98,19 @@ def constraint_by_input(calls, e, w, by_value, rate_by_value):
 
 
 class InputDerivatives:
-    """Derivatives by inputs at the state in the model's work arrays.
+    """Derivatives by inputs at the state in the work arrays of `sensing`.
+
+    Args:
+        layout: indices of the system's elements.
+        sensing: a packed Sensing of that layout; numbers written into its tables later are read.
 
     Attributes:
         differenced: names of the elements without an `input_kernel` of their own, whose kernels are differenced.
     """
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        layout = model.layout
+    def __init__(self, layout: Layout, sensing: Packed) -> None:
+        self._layout = layout
+        self._sensing: Sensing = sensing.values
         self._kernels = derivative_addresses(layout.dynamics, "input_kernel", INPUT_DERIVATIVE)
         reading = [e for e, c in enumerate(layout.dynamics) if len(c.iu)]
         self._dynamics = reading
@@ -118,7 +118,7 @@ class InputDerivatives:
         self.differenced = tuple(
             dict.fromkeys(layout.dynamics[e].element.name for e in reading if not self._kernels[e])
         )
-        work = model.sensing.values.work.values
+        work = self._sensing.work.values
         n, k = len(work.q_l), len(work.u_l)
         slopes = Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((n, 3 * k)), np.zeros((n, 1)))
         self._slopes = Packed(slopes)
@@ -126,26 +126,25 @@ class InputDerivatives:
 
     def _sources(self, sensor: Call) -> list[int]:
         """Dynamic calls that read inputs, of the elements that a composed sensor sums."""
-        calls = self._model.layout.dynamics
+        calls = self._layout.dynamics
         return [e for e in self._dynamics if calls[e].element.name in sensor.placement.sources]
 
     def _of_call(self, e: int) -> np.ndarray:
         """Ju of dynamic call e, shape (n, k, 3)."""
-        call, sensing = self._model.layout.dynamics[e], self._model.sensing.values
+        call, sensing = self._layout.dynamics[e], self._sensing
         dynamic_by_input(sensing.dynamics.table, self._kernels, e, sensing.work.table, self._slopes.table)
         Ju = self._slopes.values.Ju
         return Ju.reshape(len(Ju), -1, 3)[: len(call.iq), : len(call.iu)]
 
     def of_residual(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(r2_u, r3_u, r4_u), shapes (n_q, n_u, 3), (n_phi, n_u, 3) twice."""
-        model, layout = self._model, self._model.layout
+        layout, sensing = self._layout, self._sensing
         n_u = len(layout.input_index)
-        r2 = np.zeros((model.n_q + 7, n_u, 3))
+        r2 = np.zeros((layout.n_q + 7, n_u, 3))
         for e in self._dynamics:
             call = layout.dynamics[e]
             np.add.at(r2, (call.iq[:, None], call.iu[None, :]), self._of_call(e))
-        r3, r4 = np.zeros((model.n_phi, n_u, 3)), np.zeros((model.n_phi, n_u, 3))
-        sensing = model.sensing.values
+        r3, r4 = np.zeros((layout.n_phi, n_u, 3)), np.zeros((layout.n_phi, n_u, 3))
         for e in self._constraints:
             call = layout.constraints[e]
             by_value, rate_by_value = np.zeros((call.rows, len(call.iu))), np.zeros((call.rows, len(call.iu)))
@@ -155,13 +154,13 @@ class InputDerivatives:
                 r3[rows, into, 0] += by_value[:, k]
                 r4[rows, into, 1] += by_value[:, k]
                 r4[rows, into, 0] += rate_by_value[:, k]
-        return r2[: model.n_q], r3, r4
+        return r2[: layout.n_q], r3, r4
 
     def of_moments(self) -> np.ndarray:
         """What the inputs of summed elements add to composed sensors, shape (n_y, n_u, 3); other rows are 0."""
-        layout = self._model.layout
+        layout = self._layout
         y = np.zeros((len(layout.outputs), len(layout.input_index), 3))
-        q = self._model.sensing.values.work.values.q
+        q = self._sensing.work.values.q
         for sensor, sources in self._moments:
             for e in sources:
                 np.add.at(y[sensor.row], layout.dynamics[e].iu, -self._moment(sensor, layout.dynamics[e], e, q))

@@ -230,12 +230,12 @@ class Model:
     @cached_property
     def derivatives(self) -> Derivatives:
         """Residual and sensors with their derivatives at any operating point."""
-        return Derivatives(self)
+        return Derivatives(self.layout, self.sensing)
 
     @cached_property
     def parameter_derivatives(self) -> ParameterDerivatives:
         """Derivatives of residual and sensors by declared numbers."""
-        return ParameterDerivatives(self)
+        return ParameterDerivatives(self.layout, self.sensing, self.derivatives)
 
     def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
         """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense.

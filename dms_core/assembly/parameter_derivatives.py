@@ -12,16 +12,17 @@ sensors are differenced over the same two sets of numbers. Where the numbers of 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel
 
+from dms_core.assembly.blocks import Derivatives, OperatingPoint
 from dms_core.assembly.input_derivatives import STEP
 from dms_core.assembly.layout import Layout, same_structure
 from dms_core.assembly.local import clear, gather, views
 from dms_core.assembly.residual import evaluate_residual
-from dms_core.assembly.sensing import evaluate_sensors, new_sensing
+from dms_core.assembly.sensing import Sensing, evaluate_sensors, new_sensing
 from dms_core.assembly.tables import Calls, flat
 from dms_core.compiled.arena import Packed, matrix
 from dms_core.compiled.calls import call_entry
@@ -30,10 +31,6 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, choices
 from dms_core.model.element import PARAMETER_DERIVATIVE
 from dms_core.model.system import System
-
-if TYPE_CHECKING:
-    from dms_core.assembly.blocks import OperatingPoint
-    from dms_core.assembly.model import Model
 
 
 class ParameterBlocks(NamedTuple):
@@ -110,13 +107,21 @@ def _system_with(system: System, element: Any) -> System:
 
 
 class ParameterDerivatives:
-    """Derivatives of one model by declared numbers; what a number moves is found once."""
+    """Derivatives of one model by declared numbers; what a number moves is found once.
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        calls = model.layout.dynamics
+    Args:
+        layout: indices of the system's elements.
+        sensing: a packed Sensing of that layout; numbers written into its tables later are read.
+        derivatives: those of the same `sensing`, which put an operating point into its work arrays.
+    """
+
+    def __init__(self, layout: Layout, sensing: Packed, derivatives: Derivatives) -> None:
+        self._layout = layout
+        self._sensing: Sensing = sensing.values
+        self._derivatives = derivatives
+        calls = layout.dynamics
         self._kernels = derivative_addresses(calls, "parameter_kernel", PARAMETER_DERIVATIVE)
-        work = model.sensing.values.work.values
+        work = self._sensing.work.values
         most = max(len(c.placement.numbers) for c in calls)
         slopes = Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((1, 3)), np.zeros((len(work.q_l), most)))
         self._slopes = Packed(slopes)
@@ -130,12 +135,12 @@ class ParameterDerivatives:
         """
         if (name, path) in self._directions:
             return self._directions[name, path]
-        system, keys = self._model.system, path.split(".")
+        system, keys = self._layout.system, path.split(".")
         element = system.element(name)
         p = _number(f"{element.kind} '{name}'", element, keys)
         h = STEP * (abs(p) or 1.0)
         low, high = (Layout(_system_with(system, _moved(element, keys, x))) for x in (-h, h))
-        if not (same_structure(low, self._model.layout) and same_structure(high, self._model.layout)):
+        if not (same_structure(low, self._layout) and same_structure(high, self._layout)):
             raise InputError(f"{element.kind} '{name}': '{path}' = {p} cannot be moved alone: the structure changes.")
         halves = [
             0.5 * (_numbers(a) - _numbers(b))
@@ -148,9 +153,8 @@ class ParameterDerivatives:
 
     def of(self, name: str, path: str, point: OperatingPoint) -> ParameterBlocks:
         """Derivatives by the number `path` of element `name` at the point."""
-        model, direction = self._model, self._direction(name, path)
-        w = model.derivatives.put(point)
-        sensing, n = model.sensing.values, model.n_q
+        direction, sensing, n = self._direction(name, path), self._sensing, self._layout.n_q
+        w = self._derivatives.put(point)
         dynamics, ptr = sensing.dynamics.values, sensing.dynamics.values.par_ptr
         analytic, rest = np.zeros(n + 7), direction.dynamics.copy()
         for e in np.flatnonzero(self._kernels):
@@ -175,15 +179,15 @@ class ParameterDerivatives:
 
     def _analytic(self, e: int, slope: np.ndarray) -> np.ndarray:
         """Jp dpar/dp of dynamic call e in the rows of r2, shape (n_q + 7,)."""
-        call, sensing = self._model.layout.dynamics[e], self._model.sensing.values
+        call, sensing = self._layout.dynamics[e], self._sensing
         dynamic_by_parameter(sensing.dynamics.table, self._kernels[e], e, sensing.work.table, self._slopes.table)
-        rows = np.zeros(self._model.n_q + 7)
+        rows = np.zeros(self._layout.n_q + 7)
         np.add.at(rows, call.iq, self._slopes.values.Jp[: len(call.iq), : len(slope)] @ slope)
         return rows
 
     def _differenced(self, dynamics: np.ndarray, constraints: np.ndarray) -> tuple[str, ...]:
         """Names of elements and constraints any of whose numbers are moved."""
-        layout, sensing, names = self._model.layout, self._model.sensing.values, []
+        layout, sensing, names = self._layout, self._sensing, []
         for calls, table, moved in (
             (layout.dynamics, sensing.dynamics.values, dynamics),
             (layout.constraints, sensing.constraints.values, constraints),

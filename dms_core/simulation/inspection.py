@@ -6,11 +6,10 @@ sensors, their derivatives, and the factorised matrix of a step can be asked for
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from dms_core.assembly.blocks import Blocks, OperatingPoint, SensorBlocks
+from dms_core.assembly.model import Model
 from dms_core.assembly.parameter_derivatives import ParameterBlocks
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.compiled.arena import Packed, inner
@@ -19,12 +18,9 @@ from dms_core.linear.null_space import null_space
 from dms_core.results import Result
 from dms_core.simulation import snapshot
 from dms_core.simulation.newton_matrix import NewtonMatrix
+from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import STATE, State
-
-if TYPE_CHECKING:
-    from dms_core.assembly.model import Model
-    from dms_core.simulation.dynamics import SolverOptions
 
 
 class Inspection:

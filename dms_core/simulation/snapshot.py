@@ -11,10 +11,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from dms_core.assembly.model import Model
 from dms_core.assembly.sparsity import NewtonPattern, RatePattern
 from dms_core.assembly.tables import Signals, Tables
 from dms_core.compiled.arena import Packed
@@ -22,11 +23,8 @@ from dms_core.errors import InputError
 from dms_core.linear.lu import LuTables
 from dms_core.model.signals import Function
 from dms_core.results import Result
+from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.state import CLOCK, State, with_tables
-
-if TYPE_CHECKING:
-    from dms_core.assembly.model import Model
-    from dms_core.simulation.dynamics import SolverOptions
 
 GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")
 """Fields of Work that outlive a kernel call; the others are local arrays, written before they are read."""

@@ -120,7 +120,7 @@ class State(NamedTuple):
 
 
 class Options(NamedTuple):
-    """Numbers that steer a run, as compiled code sees them; see dynamics.SolverOptions."""
+    """Numbers that steer a run, as compiled code sees them; see options.SolverOptions."""
 
     rtol: float
     atol: float

@@ -1,13 +1,16 @@
-"""Folders of the core import in one direction."""
+"""Folders of the core import in one direction, and no files of the core or of exo_env import each other in a circle."""
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 import dms_core
+import exo_env
 
 FOLDER = Path(dms_core.__file__).parent
 ABOVE = {
@@ -19,16 +22,78 @@ ABOVE = {
 """What a folder must not import."""
 
 
-def _imported(path: Path) -> set[str]:
-    """Folders of the core that a file imports, also for its types only."""
-    nodes = ast.walk(ast.parse(path.read_text()))
-    modules = [n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module]
-    return {parts[1] for parts in (m.split(".") for m in modules) if parts[0] == "dms_core" and len(parts) > 1}
+def _module(path: Path, root: Path) -> str:
+    """Name of the module in a file; `root` is the folder of its outermost package."""
+    parts = path.relative_to(root.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _imported(path: Path, root: Path) -> Iterator[str]:
+    """Every name that a file imports, made absolute: at its head, in a function, or for its types only.
+
+    `from a import b` gives both a and a.b, since b may be a module.
+    """
+    package = path.relative_to(root.parent).parent.parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            origin = ".".join([*above, *([node.module] if node.module else [])])
+            yield origin
+            yield from (f"{origin}.{alias.name}" for alias in node.names)
+
+
+def _circle(root: Path) -> list[str]:
+    """Modules of a package of which each imports the next and the last is the first; empty where there is none."""
+    files = {_module(path, root): path for path in sorted(root.rglob("*.py"))}
+    assert files
+    graph = {module: set(_imported(path, root)) & (files.keys() - {module}) for module, path in files.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        # graphlib lists each module before the one that imports it.
+        return error.args[1][::-1]
+    return []
 
 
 @pytest.mark.parametrize("folder", ABOVE)
 def test_no_file_imports_from_a_folder_above(folder):
     files = sorted((FOLDER / folder).rglob("*.py"))
     assert files
-    wrong = {path.name: found for path in files if (found := _imported(path) & ABOVE[folder])}
+    above = {f"dms_core.{name}" for name in ABOVE[folder]}
+    folders = {_module(path, FOLDER): {".".join(x.split(".")[:2]) for x in _imported(path, FOLDER)} for path in files}
+    wrong = {module: found & above for module, found in folders.items() if found & above}
     assert not wrong
+
+
+@pytest.mark.parametrize("package", [dms_core, exo_env], ids=lambda package: package.__name__)
+def test_no_circle_of_files(package):
+    circle = _circle(Path(package.__file__).parent)
+    assert not circle, " imports ".join(circle)
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "from package.inside.one import name",
+        "from package.inside import one",
+        "import package.inside.one",
+        "from .inside.one import name",
+        "from .inside import one",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from package.inside.one import name",
+        "def function():\n    from package.inside.one import name",
+    ],
+)
+def test_a_circle_is_found_however_it_is_imported(tmp_path, back):
+    root = tmp_path / "package"
+    (root / "inside").mkdir(parents=True)
+    for path in (root, root / "inside"):
+        (path / "__init__.py").write_text("")
+    (root / "inside" / "one.py").write_text("from ..two import name\n")
+    (root / "two.py").write_text("import math\n")
+    assert _circle(root) == []
+    (root / "two.py").write_text(f"{back}\n")
+    circle = _circle(root)
+    assert circle[0] == circle[-1]
+    assert set(circle) == {"package.inside.one", "package.two"}

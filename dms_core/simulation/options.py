@@ -1,0 +1,54 @@
+"""What steers a run: tolerances, step sizes, the method."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from dms_core.errors import InputError
+from dms_core.simulation.state import Options
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """How a run is solved. The defaults keep the elbow angle of arm26 within about 4e-5 rad over a second."""
+
+    rtol: float = 1e-5
+    """Relative tolerance [-]: the local error of a step is kept below a tenth of atol + rtol |y|."""
+    atol: float | None = None
+    """Absolute tolerance of every variable in its own unit; None takes rtol times each variable's nominal size."""
+    fixed_step: float | None = None
+    """Constant step [s]; None for error control."""
+    h_max: float = 0.1
+    """Largest step [s]."""
+    h_min: float = 1e-12
+    """Step below which a run gives up [s]."""
+    newton_tol: float = 0.05
+    """Largest error left by Newton's method, over the largest local error allowed [-]."""
+    constraint_tol: float = 1e-10
+    """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s] (above 1000 / s, 1e-3 c0 times as much)."""
+    max_steps: int = 10_000_000
+    """Steps after which a run gives up."""
+    method: Literal["bdf2", "sdirk2"] = "bdf2"
+    """'sdirk2' needs no past: quicker where inputs jump every few steps, slower in smooth motion."""
+
+    def __post_init__(self) -> None:
+        for name in ("rtol", "h_max", "h_min", "newton_tol", "constraint_tol", "max_steps"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"solver option {name}: Expected a positive number, got {value!r}.")
+        for name in ("atol", "fixed_step"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"solver option {name}: Expected a positive number or None, got {value!r}.")
+        if self.method not in ("bdf2", "sdirk2"):
+            raise InputError(f"solver option method: Expected 'bdf2' or 'sdirk2', got {self.method!r}.")
+
+    def numbers(self) -> Options:
+        """The options as compiled code takes them."""
+        return Options(
+            float(self.rtol), float(self.atol or 0.0), float(self.fixed_step or 0.0), float(self.h_max),
+            float(self.h_min), float(self.newton_tol), float(self.constraint_tol), int(self.max_steps),
+            int(self.method == "sdirk2"),
+        )  # fmt: skip
