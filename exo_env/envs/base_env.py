@@ -17,6 +17,7 @@ settings. One with a page and an id of its own is a subclass in a file of its ow
 from __future__ import annotations
 
 import copy
+import math
 import warnings
 from collections.abc import Mapping
 from functools import cached_property
@@ -27,7 +28,7 @@ import numpy as np
 from gymnasium import spaces
 
 from dms_core import SolverOptions
-from dms_core.errors import InputError, choices
+from dms_core.errors import InputError, SimulationError, choices
 from dms_core.kernels import DONE, MATRIX_SINGULAR, Packed
 from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
@@ -35,7 +36,7 @@ from exo_env.drives.drive import Drive, checked_action
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.envs.draw import EpisodeDraws, Keys, checked_options
+from exo_env.envs.draw import EpisodeDraws, Keys
 from exo_env.envs.settings import (
     SOLVER_OPTIONS,
     EnvSettings,
@@ -107,7 +108,7 @@ class AssistanceEnv(gymnasium.Env):
         self._draws = EpisodeDraws(
             self.population, self.load, self.movement, self.made_movement, self.duration, self.task.start_range()
         )
-        self._options: dict[str, Any] = {}
+        self._sources = self._draws.sources
         self._keys = Keys(s.cycle)
         self._episode: Episode | None = None
         self._readout: Readout | None = None
@@ -210,16 +211,16 @@ class AssistanceEnv(gymnasium.Env):
         self._over, self._episode = True, None
         if seed is not None:
             self._keys.restart()
-        used = {**self._options, **checked_options(options)}
-        self.world.prepare(self._draws.draw(self._keys.next(self.np_random), used))
+        sources = self._draws.changed(self._sources, options)
+        self.world.prepare(self._draws.draw(self._keys.next(self.np_random), sources))
 
     def set_reset_options(self, options: Mapping[str, Any] | None) -> None:
         """Options of every reset from now on, for curricula; those that a reset is given come on top.
 
         Raises:
-            InputError: an option is unknown.
+            InputError: an option is unknown or not usable.
         """
-        self._options = dict(checked_options(options))
+        self._sources = self._draws.changed(self._draws.sources, copy.deepcopy(options))
 
     def begun(self, code: int) -> None:
         """Last part of a reset.
@@ -233,6 +234,7 @@ class AssistanceEnv(gymnasium.Env):
         """
         self._episode = Episode(self.world, *self.world.begun(code))
         self._readout = Readout(self.world, self._episode)
+        self.check_finite(self._observation(), 0.0)
         self._over = False
 
     @cached_property
@@ -277,6 +279,7 @@ class AssistanceEnv(gymnasium.Env):
 
         Raises:
             InputError: the action has another shape or is not finite.
+            SimulationError: the task's own code gives a reward or an observation that is not finite.
             gymnasium.error.ResetNeeded: there is no episode, or it is over.
         """
         used, _ = checked_action(action, self.actions), self.episode
@@ -287,13 +290,27 @@ class AssistanceEnv(gymnasium.Env):
         world = self.world
         if run_period(world.packed.table, used) != DONE:
             self.rescue()
+        observation, reward = self._observation(), world.tables.task.reward.item()
+        self.check_finite(observation, reward)
         status = world.tables.status.tolist()
         terminated, truncated = status[STATUS.event] != NOTHING, status[STATUS.step] == self.steps
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
         info = self.readout.info(self._weights, self.happened() if terminated else None)
-        return self._observation(), world.tables.task.reward.item(), terminated, truncated, info
+        return observation, reward, terminated, truncated, info
+
+    def check_finite(self, observation: np.ndarray, reward: float) -> None:
+        """Refuse what a task's own code may give.
+
+        Raises:
+            SimulationError: observation or reward is not finite; names reward terms, readings and channels.
+        """
+        # Nearly always a sum of squares tells it in one cheap call.
+        if math.isfinite(reward + float(observation.dot(observation))):
+            return
+        if not (math.isfinite(reward) and np.isfinite(observation).all()):
+            raise SimulationError(self.readout.not_finite())
 
     def rescue(self) -> None:
         """Go on where compiled code gave up: a singular matrix may need another order of elimination."""

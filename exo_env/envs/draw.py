@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,19 @@ def checked_options(options: Any) -> Mapping[str, Any]:
     return options or {}
 
 
+@dataclass(frozen=True)
+class Sources:
+    """What an episode is drawn from."""
+
+    patients: Population
+    loads: Draws
+    """Distribution of the weight on the machine [kg]."""
+    movement: Movement
+    """What patients intend."""
+    start_deg: float | None = None
+    """Angle at which the episode begins [deg]; None: where the movement starts."""
+
+
 class EpisodeDraws:
     """What the episodes of an environment are drawn from.
 
@@ -77,6 +91,9 @@ class EpisodeDraws:
         movement_of: makes another movement from what a reset option gives.
         duration: length of an episode [s].
         start_range: elbow angles at which an episode may begin [deg].
+
+    Raises:
+        InputError: the movement may start where no episode may.
     """
 
     def __init__(
@@ -88,27 +105,61 @@ class EpisodeDraws:
         duration: float,
         start_range: tuple[float, float],
     ) -> None:
-        self.patients, self.loads, self.movement = patients, Draws({LOAD: load}), movement
         self.movement_of, self.duration, self.start_range = movement_of, duration, start_range
+        self.sources = self._checked(Sources(patients, Draws({LOAD: load}), movement))
 
-    def draw(self, key: int, options: Mapping[str, Any]) -> Draw:
+    def changed(self, sources: Sources, options: Any) -> Sources:
+        """Sources with the options of a reset in place of what they fix.
+
+        Args:
+            sources: what is drawn from where an option is not given.
+            options: options of a reset, None for none.
+
+        Raises:
+            InputError: an option is unknown or not usable.
+        """
+        made: dict[str, Any] = {}
+        for name, value in checked_options(options).items():
+            if name == "patient":
+                made["patients"] = population(value)
+            elif name == "load":
+                made["loads"] = Draws({LOAD: load_distribution(value)})
+            elif name == "reference":
+                made["movement"] = self.movement_of(value)
+            else:
+                made["start_deg"] = self._start(value)
+        return self._checked(replace(sources, **made)) if made else sources
+
+    def _start(self, angle: Any) -> float:
+        """An angle at which an episode may begin [deg]."""
+        low, high = self.start_range
+        if not within(angle, low, high):
+            raise InputError(f"initial_angle_deg = {angle!r}: expected a number from {low:g} to {high:g}.")
+        return float(angle)
+
+    def _checked(self, sources: Sources) -> Sources:
+        """The sources, if every start that they give is one at which an episode may begin."""
+        low, high = self.start_range
+        starts = sources.movement.spread(START).limits()
+        if sources.start_deg is None and not all(within(x, low, high) for x in starts):
+            raise InputError(
+                f"The movement may start from {min(starts):g} to {max(starts):g} deg, and the limits let an episode "
+                f"begin from {low:g} to {high:g} deg only; give wider limits, or a reference with other {START}."
+            )
+        return sources
+
+    def draw(self, key: int, sources: Sources) -> Draw:
         """What is drawn for the episode of a key.
 
         Args:
             key: key of the random streams.
-            options: options of the reset; what they fix is drawn from the same streams, and moves nothing else.
-
-        Raises:
-            InputError: an option is not usable.
+            sources: what is drawn from; another source of one thing moves nothing else.
         """
         k = np.uint64(key)
-        patients = population(options["patient"]) if "patient" in options else self.patients
-        loads = Draws({LOAD: load_distribution(options["load"])}) if "load" in options else self.loads
-        movement = self.movement_of(options["reference"]) if "reference" in options else self.movement
-        numbers = movement.draw(k, self.duration)
-        start_deg = options.get("initial_angle_deg", numbers[movement.names.index(START)])
-        low, high = self.start_range
-        if not within(start_deg, low, high):
-            raise InputError(f"initial_angle_deg = {start_deg!r}: expected a number from {low:g} to {high:g}.")
+        numbers = sources.movement.draw(k, self.duration)
+        start_deg = sources.start_deg
+        if start_deg is None:
+            start_deg = float(numbers[sources.movement.names.index(START)])
         phase = 2.0 * math.pi * uniform(k, PHASE, 0)
-        return Draw(key, patients.draw(k), float(loads.sample(k)[0]), numbers, math.radians(start_deg), phase)
+        patient, load = sources.patients.draw(k), float(sources.loads.sample(k)[0])
+        return Draw(key, patient, load, numbers, math.radians(start_deg), phase)

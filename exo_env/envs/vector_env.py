@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from dms_core.errors import InputError, choices
+from dms_core.errors import InputError, SimulationError, choices
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.tables import STATUS
 from exo_env.tasks.task import NOTHING, SOLVER, Task
@@ -174,6 +174,7 @@ class AssistanceVectorEnv(VectorEnv):
 
         Raises:
             InputError: the actions have another shape or are not finite.
+            SimulationError: the task's own code gives a reward or an observation that is not finite.
             gymnasium.error.ResetNeeded: an episode is over and nothing resets it by itself.
         """
         used = self._checked(actions)
@@ -191,6 +192,7 @@ class AssistanceVectorEnv(VectorEnv):
             self._take_over(i)
         status = self._batch.status
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
+        self._check_finite(rewards)
         terminated = running & (status[:, STATUS.event] != NOTHING)
         truncated = running & (status[:, STATUS.step] == self.envs[0].steps)
         infos = self._infos(running) if running.any() else {}
@@ -200,6 +202,13 @@ class AssistanceVectorEnv(VectorEnv):
             infos = self._same_step(self._over.copy(), infos)
         self._started = True
         return self._batch.observations.copy(), rewards, terminated, truncated, infos
+
+    def _check_finite(self, rewards: np.ndarray) -> None:
+        """Refuse rewards and observations that are not finite; names the world."""
+        fine = np.isfinite(rewards) & np.isfinite(self._batch.observations).all(axis=1)
+        if not fine.all():
+            i = int(np.flatnonzero(~fine)[0])
+            raise SimulationError(f"World {i}: {self.envs[i].readout.not_finite()}")
 
     def _checked(self, actions: Any) -> np.ndarray:
         """The actions, clipped to the box; refuses those that are not finite or of another shape."""

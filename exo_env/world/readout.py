@@ -72,6 +72,20 @@ class Readout:
             return f"{dynamics.result.value} Stopped at t = {dynamics.time:.6g} s."
         return self.world.task.event(code, self)
 
+    def not_finite(self) -> str:
+        """The sentence on reward terms, readings and observed channels that are not finite."""
+        task, tables = self.world.task, self.world.tables
+        parts: list[tuple[str, Any]] = [("the reward", tables.task.reward)]
+        parts += [(f"reward term '{name}'", x) for name, x in zip(task.terms, tables.task.terms, strict=True)]
+        parts += [(f"reading '{r.name}'", self(r.name)) for r in task.readings]
+        seen = tables.observer.observation
+        parts += [
+            (f"observed channel '{s.group}.{s.name}'", seen[s.start : s.stop]) for s in self.world.observer.structure
+        ]
+        found = [name for name, x in parts if not np.isfinite(x).all()]
+        time = self.world.times.item(tables.status.item(STATUS.step))
+        return f"At t = {time:.6g} s these are not finite: {', '.join(found)}. The code of the task gives them."
+
     def start_info(self, movement: Movement) -> dict[str, Any]:
         """The `info` of a reset: patient, load, ability, movement and angle of the start.
 

@@ -148,3 +148,32 @@ def test_a_load_that_is_no_number_is_refused_in_a_line():
     with pytest.raises(InputError, match=r"load = nan: expected a number from 0.05 to 50.0 kg") as caught:
         ElbowLiftEnv(load=float("nan"))
     assert "\n" not in str(caught.value)
+
+
+def test_limits_that_exclude_the_starts_are_refused_at_once():
+    with pytest.raises(InputError, match="may start from 20 to .* begin from 30 to"):
+        ElbowLiftEnv(limits={"lowest_deg": 30.0})
+    env = ElbowLiftEnv(limits={"lowest_deg": 30.0}, reference={"start_deg": 35.0})
+    with pytest.raises(InputError, match="may start from 20 to 20 deg"):
+        env.set_reset_options({"reference": {"start_deg": 20.0}})
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"load": "abc"}, "load = 'abc'"),
+        ({"patient": "nobody"}, "population 'nobody'"),
+        ({"initial_angle_deg": "low"}, "initial_angle_deg = 'low'"),
+    ],
+)
+def test_reset_options_are_checked_when_they_are_set(env, options, complaint):
+    with pytest.raises(InputError, match=complaint):
+        env.set_reset_options(options)
+
+
+def test_reset_options_are_a_copy():
+    env, options = ElbowLiftEnv(), {"load": {"uniform": [1.0, 1.0]}}
+    env.set_reset_options(options)
+    options["load"]["uniform"][:] = [3.0, 3.0]
+    env.reset(seed=0)
+    assert env.episode.load == 1.0
