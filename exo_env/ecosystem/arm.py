@@ -27,7 +27,7 @@ from dms_core.model import GROUND, Fixed, PathPoint, Revolute, RigidBody, Thelen
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.geometry.frames import quaternion, rotation_matrix, unit
 from exo_env.ecosystem.person import HEIGHT_0, MASS_0, Person
-from exo_env.ecosystem.subject import BODY_ROLES, DEFAULT, subject_facts
+from exo_env.ecosystem.subject import BODY_ROLES, DEFAULT, Subject, read_subject
 
 ELBOW = "elbow"
 MASS_FRACTION = {
@@ -67,12 +67,15 @@ class Arm:
     """
 
     person: Person = Person()
-    subject: str = DEFAULT
+    subject: str | Subject = DEFAULT
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "subject", read_subject(self.subject))
 
     @property
     def facts(self) -> dict[str, Any]:
         """Contents of the subject's file."""
-        return subject_facts(self.subject)
+        return read_subject(self.subject).facts
 
     @property
     def muscles(self) -> tuple[str, ...]:
@@ -232,7 +235,7 @@ class Arm:
         """Length of each muscle's scaled path over that of arm26, at 90 degrees [-]."""
         if self.person.height == HEIGHT_0 and self.person.sex == "male":
             return dict.fromkeys(self.muscles, 1.0)
-        lengths = _path_lengths(self.subject)
+        lengths = _path_lengths(read_subject(self.subject))
         return {name: self.muscle_geometry(name, radians(90.0))[0] / x for name, x in lengths.items()}
 
     def inertia_about_elbow(self) -> float:
@@ -249,7 +252,7 @@ class Arm:
 
 
 @cache
-def _path_lengths(subject: str) -> dict[str, float]:
+def _path_lengths(subject: Subject) -> dict[str, float]:
     """Length of each muscle's path before it is scaled, at 90 degrees [m]."""
     arm = Arm(subject=subject)
     return {name: arm.muscle_geometry(name, radians(90.0))[0] for name in arm.muscles}

@@ -24,7 +24,7 @@ from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine, LoadedMachine
 from exo_env.ecosystem.person import Person
 from exo_env.ecosystem.sensors import sensors
-from exo_env.ecosystem.subject import DEFAULT
+from exo_env.ecosystem.subject import DEFAULT, AnySubject, read_subject
 from exo_env.ecosystem.worn_exoskeleton import GuideKind, Misalignment, WornExoskeleton
 from exo_env.settings import Settings
 
@@ -57,7 +57,9 @@ class Ecosystem(Settings):
     """Person, device and machine that are joined. The defaults are the paper's system with arm26 and one kilogram."""
 
     person: Person = Person()
-    subject: str = Field(default=DEFAULT, description="anatomy: a shipped subject by name, or a YAML file")
+    subject: AnySubject = Field(
+        default_factory=lambda: read_subject(DEFAULT), description="anatomy: a shipped subject by name, or a YAML file"
+    )
     device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.named(DEFAULT_DEVICE))
     machine: GymMachine | None = Field(
         default_factory=lambda: GymMachine.from_config("gym_machine/pulley.yaml"), description="None: the hand is empty"

@@ -12,11 +12,13 @@ Muscles that are no flexors are extensors. Another file may have other muscles, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from dataclasses import dataclass, field
+from functools import lru_cache
+from hashlib import blake2b
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, model_validator
 
 from dms_core.config_files import config_file, configs
 from dms_core.errors import InputError, choices
@@ -121,30 +123,64 @@ def _check_role(role: str, name: str, known: Mapping[str, Any], section: str) ->
         raise ValueError(f"roles: {role} = {name!r}; expected one of the {section} {choices(known)}")
 
 
-@cache
-def subject_facts(source: str) -> dict[str, Any]:
-    """Contents of a subject's file, checked and read once.
+@dataclass(frozen=True)
+class Subject:
+    """An anatomy as its file was when it was read: two are equal where name and contents are."""
+
+    source: str
+    """Name of a shipped subject, or whole path of a YAML file."""
+    digest: str
+    """Digest of the file's contents."""
+    facts: dict[str, Any] = field(compare=False, repr=False)
+    """Contents of the file."""
+
+
+def read_subject(source: str | Subject) -> Subject:
+    """A subject, its file checked; read again where the file has changed.
 
     Args:
-        source: name of a shipped subject, or path of a YAML file.
+        source: name of a shipped subject, path of a YAML file, or a subject that was read before.
 
     Raises:
         InputError: there is no such subject, or its file is wrong; names file, key and value.
     """
+    if isinstance(source, Subject):
+        return source
     path = _path(source)
+    try:
+        content = path.read_bytes()
+    except OSError:
+        content = b""  # what reads the file below says why it cannot be read
+    return _read(source if source in _shipped() else str(path.resolve()), path, content)
+
+
+@lru_cache(maxsize=16)
+def _read(source: str, path: Path, content: bytes) -> Subject:
     facts = read_yaml(path)
     try:
         SubjectFacts(**facts)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return facts
+    return Subject(source, blake2b(content, digest_size=16).hexdigest(), facts)
+
+
+AnySubject = Annotated[
+    Subject | str,
+    PlainValidator(read_subject),
+    PlainSerializer(lambda subject: f"{subject.source} {subject.digest}"),
+]
+"""A subject as a setting: given by name, by path, or as one that was read."""
+
+
+def _shipped() -> list[str]:
+    """Names of the shipped subjects."""
+    return sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
 
 
 def _path(source: str) -> Path:
     """Path of the file of a subject."""
     if source.endswith((".yaml", ".yml")):
         return Path(source)
-    shipped = sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
-    if source not in shipped:
-        raise InputError(f"subject = {source!r}: expected one of {choices(shipped)}, or a YAML file.")
+    if source not in _shipped():
+        raise InputError(f"subject = {source!r}: expected one of {choices(_shipped())}, or a YAML file.")
     return config_file(f"subject/{source}.yaml")

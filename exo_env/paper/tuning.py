@@ -34,7 +34,7 @@ from dms_core.model.control.ziegler_nichols import (
 )
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import Exoskeleton
-from exo_env.ecosystem.subject import DEFAULT
+from exo_env.ecosystem.subject import DEFAULT, Subject
 
 START = radians(60.0)
 """Elbow angle at which the step begins [rad]: the middle of the exercise."""
@@ -70,7 +70,7 @@ class StepExperiment:
         subject: anatomy, a shipped one by name or a YAML file.
     """
 
-    def __init__(self, device: Exoskeleton, subject: str = DEFAULT) -> None:
+    def __init__(self, device: Exoskeleton, subject: Subject | str = DEFAULT) -> None:
         self.subject = subject
         # A limit no response reaches.
         self.device = device.changed(actuator=device.actuator.changed(max_tension=1e6))

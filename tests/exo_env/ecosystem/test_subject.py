@@ -7,13 +7,15 @@ import yaml
 
 from dms_core.config_files import config_file
 from dms_core.errors import InputError
-from exo_env.ecosystem.subject import subject_facts
+from exo_env.ecosystem.arm import Arm
+from exo_env.ecosystem.ecosystem import Ecosystem
+from exo_env.ecosystem.subject import read_subject
 
 ARM26 = yaml.safe_load(config_file("subject/arm26.yaml").read_text())
 
 
 def test_the_shipped_file_is_read_as_it_is():
-    assert subject_facts("arm26") == ARM26
+    assert read_subject("arm26").facts == ARM26
 
 
 @pytest.mark.parametrize(
@@ -53,5 +55,33 @@ def test_mistakes_are_named(tmp_path, keys, value, complaint):
     path = tmp_path / "mine.yaml"
     path.write_text(yaml.safe_dump(facts))
     with pytest.raises(InputError) as caught:
-        subject_facts(str(path))
+        read_subject(str(path))
     assert str(path) in str(caught.value) and complaint in str(caught.value)
+
+
+def written(path, mass):
+    """A file with another mass of the humerus."""
+    facts = copy.deepcopy(ARM26)
+    facts["bodies"]["r_humerus"]["mass"] = mass
+    path.write_text(yaml.safe_dump(facts))
+
+
+def test_a_file_is_read_again_when_it_changes_and_kept_by_who_has_it(tmp_path):
+    path = tmp_path / "mine.yaml"
+    written(path, 2.0)
+    before = Ecosystem(subject=str(path))
+    written(path, 3.0)
+    after = Ecosystem(subject=str(path))
+    assert before != after and hash(before) != hash(after)
+    masses = [e.changed(weight=2.0).arm().facts["bodies"]["r_humerus"]["mass"] for e in (before, after)]
+    assert masses == [2.0, 3.0]
+
+
+def test_a_relative_path_is_that_of_the_present_folder(tmp_path, monkeypatch):
+    masses = []
+    for name, mass in (("one", 2.0), ("two", 3.0)):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        written(tmp_path / name / "mine.yaml", mass)
+        masses.append(Arm(subject="mine.yaml").facts["bodies"]["r_humerus"]["mass"])
+    assert masses == [2.0, 3.0]
