@@ -7,9 +7,10 @@ linear in few monomials,
     x = C phi,   phi = (1, H, H^2, M, M H^2, load, strength M / H, tau_act, tau_deact, 1 / min(tau_act, tau_deact),
                         traits of joints)
 
-with constants C for an ecosystem, a drive and a sex, known by declaring as many persons as there are monomials; one
-more person is declared to see that it is so. Only the length of the gym rope and the start of what moves are not
-linear; rest_pose.py gives them.
+with constants C for an ecosystem, a drive and a sex, known by declaring as many persons as there are monomials: first
+with joints as the defaults have them, then one for each trait of joints, so that a further trait leaves the numbers of
+all that have its default what they were, to the bit. One more person is declared to see that it is so. Only the length
+of the gym rope and the start of what moves are not linear; rest_pose.py gives them.
 """
 
 from __future__ import annotations
@@ -231,24 +232,36 @@ class Scaling:
         return self.both[SEXES.index(sex) * n :][:n]
 
     def _fitted(self, sex: Sex) -> np.ndarray:
-        """Constants C, shape (n, monomials), from as many persons as there are monomials, and checked by one more."""
+        """Constants C, shape (n, monomials): of sizes from as many persons with neutral joints, then trait by trait.
+
+        So that a further trait of joints leaves all other constants what they are, to the bit.
+        """
         sizes, joints = np.random.default_rng(0), np.random.default_rng(1)
-        rows, found = [], []
-        for _ in range(len(MONOMIALS) + 1):
-            phi, numbers = self._declared(sex, sizes, joints)
-            rows.append(phi)
-            found.append(numbers)
-        C = np.linalg.solve(np.array(rows[:-1]), np.array(found[:-1])).T
-        C = np.where(np.abs(C) > NOISE * np.abs(found[:-1]).max(axis=0)[:, None], C, 0.0)
-        self._check(C @ rows[-1], np.array(found[-1]), np.abs(found).max(axis=0))
+        neutral = {name: float(Person.model_fields[name].default) for name in JOINT_TRAITS}
+        rows, found = zip(*(self._declared(sex, sizes, neutral) for _ in range(SIZES)), strict=True)
+        known, largest = np.linalg.solve(np.array(rows)[:, :SIZES], np.array(found)), np.abs(found).max(axis=0)
+        C = np.zeros((known.shape[1], len(MONOMIALS)))
+        C[:, :SIZES] = known.T
+        for k, name in enumerate(JOINT_TRAITS):
+            phi, numbers = self._declared(sex, sizes, neutral | {name: joints.uniform(*range_of(Person, name))})
+            more = numbers - C[:, :SIZES] @ phi[:SIZES]
+            C[:, SIZES + k] = np.where(np.abs(more) > LINEAR * np.maximum(largest, 1.0), more, 0.0) / (
+                phi[SIZES + k] - neutral[name]
+            )
+            largest = np.maximum(largest, np.abs(numbers))
+        C[:, 0] -= C[:, SIZES:] @ np.array([neutral[name] for name in JOINT_TRAITS])
+        C = np.where(np.abs(C) > NOISE * largest[:, None], C, 0.0)
+        phi, numbers = self._declared(
+            sex, sizes, {name: joints.uniform(*range_of(Person, name)) for name in JOINT_TRAITS}
+        )
+        self._check(C @ phi, numbers, np.maximum(largest, np.abs(numbers)))
         return C
 
     def _declared(
-        self, sex: Sex, sizes: np.random.Generator, joints: np.random.Generator
+        self, sex: Sex, sizes: np.random.Generator, traits: dict[str, float]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Monomials phi and all numbers of a random person."""
         m, h, strength, load, rise, fall = sizes.uniform((0.5, 0.8, 0.5, 0.5, 0.8, 3.0), (2.0, 1.2, 2.0, 2.0, 8.0, 5.0))
-        traits = {name: joints.uniform(*range_of(Person, name)) for name in JOINT_TRAITS}
         person = Person(body_mass=m * MASS_0, height=h * HEIGHT_0, sex=sex, strength=strength, **traits)
         times = {"activation_time_constant": 0.01 * rise, "deactivation_time_constant": 0.01 * fall}
         joined = self.ecosystem.changed(person=person, weight=load)

@@ -12,7 +12,8 @@ from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.patient.patient import Patient
 from exo_env.patient.population import population
 from exo_env.tasks.repetition import Repetition
-from exo_env.world.scaling import Numbers, declared, monomials, numbers_of, scaling_of, template
+from exo_env.world import scaling
+from exo_env.world.scaling import SIZES, Numbers, Scaling, declared, monomials, numbers_of, scaling_of, template
 
 DRIVES = ElbowLiftEnv.drives
 MODES = tuple(DRIVES)
@@ -124,3 +125,32 @@ class WithSpring(Ecosystem):
 def test_a_number_that_is_not_linear_in_the_sizes_is_named():
     with pytest.raises(ModelError, match="element 'band': a number of it, .* is not linear in the person's sizes"):
         scaling_of(WithSpring(), DRIVES["rope_tension"]()).coefficients("male")
+
+
+class Known(Scaling):
+    """A scaling of numbers that are linear in phi with known constants."""
+
+    def __init__(self, constants):
+        self.constants = constants
+
+    def _declared(self, sex, sizes, traits):
+        phi = np.concatenate([sizes.uniform(0.5, 2.0, SIZES), list(traits.values())])
+        phi[0] = 1.0
+        return phi, self.constants @ phi
+
+    def _check(self, fitted, numbers, largest):
+        np.testing.assert_allclose(fitted, numbers, rtol=1e-9)
+
+
+def test_a_trait_of_joints_moves_no_constant_of_the_sizes(monkeypatch):
+    """To the bit: a neutral trait must not move what a seed gives to those who have its default."""
+    constants = np.random.default_rng(5).normal(size=(4, SIZES + 1))
+    constants[:3, SIZES] = 0.0  # only the last number depends on the trait
+    without = Known(constants[:, :SIZES])._fitted("male")
+    monkeypatch.setattr(scaling, "MONOMIALS", (*scaling.MONOMIALS, "trait"))
+    monkeypatch.setattr(scaling, "JOINT_TRAITS", ("strength",))  # any name with a range and a default
+    found = Known(constants)._fitted("male")
+    np.testing.assert_array_equal(found[:3, :SIZES], without[:3])
+    assert not found[:3, SIZES].any()
+    # As exact as a linear solve of random persons is.
+    np.testing.assert_allclose(found, constants, rtol=1e-8, atol=1e-8)
