@@ -56,7 +56,7 @@ from exo_env.tables import (
 from exo_env.tasks.course import course_of
 from exo_env.tasks.noise import IMPERFECTION
 from exo_env.world.control_period import begin, effort_of, options_of
-from exo_env.world.rest_pose import put_rest
+from exo_env.world.rest_pose import hinge_angle, hinge_transmission, put_rest
 from exo_env.world.scaling import put_numbers
 
 STILL, BESIDE = 1e-9, 2
@@ -194,8 +194,10 @@ def put_inputs(w, arm, load, activations):
     subject, drive, g = inner(w, WORLD.subject), inner(w, WORLD.drive), vec(load.gravity, 0)
     angle, ends = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start], matrix(subject, SUBJECT.rope)
     needed = needed_moment(arm, load, angle, 0.0, 0.0)
-    needed += link_moment(floats(subject, SUBJECT.link), angle, math.sqrt(dot(g, g)))
-    tension = (needed - muscle_moment(arm, angle, activations)) / rope_lever(ends[0], ends[1], angle)
+    hinge, transmission = hinge_angle(w, arm, angle), hinge_transmission(w, arm, angle)
+    needed += transmission * link_moment(floats(subject, SUBJECT.link), hinge, math.sqrt(dot(g, g)))
+    lever = transmission * rope_lever(ends[0], ends[1], hinge)
+    tension = (needed - muscle_moment(arm, angle, activations)) / lever
     signals = inner(inner(inner(w, WORLD.dynamics), DYNAMICS.state), STATE.signals)
     commands, start, rows = floats(drive, DRIVE.commands), matrix(drive, DRIVE.start), ints(drive, DRIVE.rows)
     for i in range(commands.shape[0]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from dms_core.kernels import floats, inner, ints, matrix
-from dms_core.model.geometry.rotations import add, dot, rotated, sub, turned, vec
+from dms_core.model.geometry.rotations import add, cross, dot, rotated, sub, turned, vec
 from dms_core.model.muscles.muscle import fibre_at_rest
 from exo_env.ecosystem.gym_machine import handle_angle
 from exo_env.jit import compiled
@@ -58,17 +58,38 @@ def _distance(a, b):
 @compiled
 def hinge_angle(w, arm, angle):
     """Angle of the hinge where the elbow is at an angle [rad]."""
-    rest = inner(w, WORLD.rest)
-    if ints(rest, REST.misaligned)[0] == 0:
+    if ints(inner(w, WORLD.rest), REST.misaligned)[0] == 0:
         return angle
-    n, axes = vec(arm.axis, 0), matrix(inner(w, WORLD.drive), DRIVE.axes)
-    r = turned(n, math.cos(angle), math.sin(angle), vec(floats(rest, REST.guided), 0))
-    d = sub(r, vec(floats(rest, REST.shift), 0))
-    x, y = 0.0, 0.0
-    for i in range(3):
-        x += axes[i, 0] * d[i]
-        y += axes[i, 1] * d[i]
+    x, y = _in_hinge_axes(w, sub(_guided(w, arm, angle), vec(floats(inner(w, WORLD.rest), REST.shift), 0)))
     return math.atan2(x, -y)
+
+
+@compiled
+def hinge_transmission(w, arm, angle):
+    """Rate of the hinge over that of the elbow, at an angle of the elbow [rad] [-]."""
+    if ints(inner(w, WORLD.rest), REST.misaligned)[0] == 0:
+        return 1.0
+    r = _guided(w, arm, angle)
+    x, y = _in_hinge_axes(w, sub(r, vec(floats(inner(w, WORLD.rest), REST.shift), 0)))
+    dx, dy = _in_hinge_axes(w, cross(vec(arm.axis, 0), r))
+    return (x * dy - y * dx) / (x * x + y * y)
+
+
+@compiled
+def _guided(w, arm, angle):
+    """Vector from the elbow to the guided point of the forearm, in ground axes [m]."""
+    point = vec(floats(inner(w, WORLD.rest), REST.guided), 0)
+    return turned(vec(arm.axis, 0), math.cos(angle), math.sin(angle), point)
+
+
+@compiled
+def _in_hinge_axes(w, r):
+    """Components of a vector along the x and y axes of the upper link."""
+    axes, x, y = matrix(inner(w, WORLD.drive), DRIVE.axes), 0.0, 0.0
+    for i in range(3):
+        x += axes[i, 0] * r[i]
+        y += axes[i, 1] * r[i]
+    return x, y
 
 
 @compiled

@@ -254,3 +254,16 @@ def arrays_of(tables):
             yield x
         elif isinstance(x, tuple):
             yield from arrays_of(x)
+
+
+@pytest.mark.parametrize(
+    "worn", [None, {"shift": [0.01, 0.01, 0.0]}, {"shift": [0.0, 0.0, 0.0], "tilt_deg": [4.0, 0.0]}]
+)
+def test_the_start_holds_a_limp_arm_however_the_device_is_worn(worn):
+    limp = {"maximum_activation_flexors": 0.0, "maximum_activation_extensors": 0.0}
+    env = ElbowLiftEnv(misalignment=worn, patient=limp, load=2.0)
+    env.reset(seed=1)
+    held, most = env.world.tables.drive.commands.copy(), np.array(env.drive.max_tension)
+    env.step(2.0 * held / most - 1.0)
+    # The device's links turn in a plane that leans against gravity, which is left out: 2e-4 rad/s in a period.
+    assert abs(env.readings()["elbow_angle.rate"]) < 2e-3
