@@ -76,9 +76,14 @@ class _Announcer(event.Listener):
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = stream or sys.stderr
+        self._given = stream
         self._depth, self._ended, self._done = 0, -math.inf, 0
         self._began = self._spoke = 0.0
+
+    @property
+    def _stream(self) -> TextIO:
+        """Where words go: to what stderr is now, since who has redirected it may have closed what it was."""
+        return self._given or sys.stderr
 
     def on_start(self, event: event.Event) -> None:
         """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""

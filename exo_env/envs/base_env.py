@@ -21,7 +21,7 @@ import math
 import warnings
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import gymnasium
 import numpy as np
@@ -258,7 +258,9 @@ class AssistanceEnv(gymnasium.Env):
             gymnasium.error.ResetNeeded: `reset` was not called.
         """
         if self._episode is None:
-            raise gymnasium.error.ResetNeeded("The environment has no episode; call reset() first.")
+            raise gymnasium.error.ResetNeeded(
+                "The environment has no episode; call reset() first. A copy begins without one."
+            )
         return self._episode
 
     @property
@@ -378,6 +380,10 @@ class AssistanceEnv(gymnasium.Env):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+    def __copy__(self) -> Self:
+        """A copy with a generator of its own: sharing one would let each copy change what the other draws."""
+        return copy.deepcopy(self)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the episode and its compiled world: a copy is the same environment, and must be reset."""

@@ -18,7 +18,8 @@ class AssistanceVecEnv(VecEnv):
 
     `terminal_observation` is the last observation, and `TimeLimit.truncated` tells an episode that time ended from one
     that an event did, so that value estimates bootstrap where they should. An ended episode's time, the numbers that
-    the task reports, and solver_failed are in it too.
+    the task reports, and solver_failed are in it too. Infos of other periods are empty; `reset_infos` has what each
+    world's present episode began with.
 
     Args:
         worlds: a batch, made with `autoreset_mode="SameStep"`.
@@ -41,6 +42,7 @@ class AssistanceVecEnv(VecEnv):
         options of the automatic resets behind an episode's end.
         """
         observations, _ = self.worlds.reset_each(self._seeds, self._options)
+        self.reset_infos = [env.start_info() for env in self.worlds.envs]
         self._reset_seeds()
         self._reset_options()
         return observations
@@ -61,6 +63,7 @@ class AssistanceVecEnv(VecEnv):
                 "terminal_observation": stepped["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
             }
+            self.reset_infos[i] = self.worlds.envs[i].start_info()
         return observations, rewards.astype(np.float32), over, infos
 
     def close(self) -> None:

@@ -97,3 +97,13 @@ def test_elsewhere_there_is_a_line_now_and_then(monkeypatch):
 
 def test_functions_that_are_not_kept_are_not_announced(said):
     assert said(cache=False) == ""
+
+
+def test_words_go_to_what_stderr_is_now(monkeypatch):
+    first, second = io.StringIO(), io.StringIO()
+    monkeypatch.setattr("sys.stderr", first)
+    announcer = _Announcer()
+    first.close()
+    monkeypatch.setattr("sys.stderr", second)
+    announcer.on_start(_event("one"))
+    assert "compiling what is new" in second.getvalue()

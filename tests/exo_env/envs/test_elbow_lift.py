@@ -127,3 +127,12 @@ def test_device_groups_of_three_ropes():
     r = env.readings()
     assert r["second_tension"] > 40.0 and observation[4] == pytest.approx(r["second_tension"] / 100.0, abs=0.05)
     assert r["solver.largest_phi"] < 1e-9
+
+
+def test_a_copy_draws_from_a_generator_of_its_own(env):
+    env.reset(seed=4)
+    twin = copy.copy(env)
+    twin.reset()
+    with pytest.raises(gymnasium.error.ResetNeeded, match="A copy begins without one"):
+        _ = copy.copy(env).episode
+    assert env.reset()[1] == twin.start_info()

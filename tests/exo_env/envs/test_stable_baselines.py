@@ -60,7 +60,7 @@ def test_options_hold_for_the_next_reset_only(worlds):
     worlds.seed(0)
     worlds.set_options({"load": 1.25})
     worlds.reset()
-    assert loads(worlds) == [1.25, 1.25]
+    assert loads(worlds) == [1.25, 1.25] == [info["load"] for info in worlds.reset_infos]
     worlds.reset()
     assert 1.25 not in loads(worlds)
 
@@ -75,7 +75,7 @@ def test_reset_options_hold_behind_the_end_of_an_episode(worlds):
             assert given == 0.75 != drawn
             for _ in range(10):
                 _, _, over, _ = worlds.step(np.zeros((2, 2), np.float32))
-            assert over.all()
+            assert over.all() and [info["load"] for info in worlds.reset_infos] == loads(worlds)
     finally:
         worlds.env_method("set_reset_options", None)
 
