@@ -21,5 +21,6 @@ for name, exoskeleton in changes.items():
             break
     rms = np.sqrt(np.mean(np.square(errors)))
     print(f"{name:22} rms error {rms:.2f} deg, peak tension {max(tensions):.0f} N, after {len(errors)} periods")
+    print(" " * 22, info.get("event", "nothing unsafe"))
 
 # A device of one's own is a file like configs/exoskeletons/elbow.yaml: ElbowLiftEnv(exoskeleton="mine.yaml").

@@ -17,4 +17,4 @@ env = ElbowLiftEnv(patient=str(file))
 abilities = [env.reset(seed=k)[1]["ability"] for k in range(5)]
 print("abilities of five patients of the population:", [f"{x:.2f}" for x in abilities])
 
-# Homework: with `cycle=5`, which patients come at the sixth reset?
+# With `cycle=5` the sixth reset brings the first of five patients again.

@@ -109,7 +109,7 @@ class ElbowLiftEnv(AssistanceEnv):
     | `patient`          | `"mixed"`        | population by name or YAML file; fields of one, or of a patient          |
     | `load`             | `None`           | weight [kg], or a distribution; `None`: 0.5 to 2                         |
     | `exoskeleton`      | `None`           | device by name or YAML file, or changes of the default one               |
-    | `misalignment`     | `None`           | how the device is worn: `shift` [m], `tilt_deg` of the hinge             |
+    | `misalignment`     | `None`           | `shift` [x, y, z] m of the hinge, `tilt_deg` [about x, then y]           |
     | `subject`          | `"arm26"`        | anatomy by name or YAML file                                             |
     | `reference`        | `None`           | distributions of start_deg, amplitude_deg, rest, duration, pause         |
     | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`                                                      |
@@ -126,7 +126,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | `repetitions`      | `1`              | one begins every `episode_duration / repetitions`, or after the last one |
 
     `readings()` gives every sensor of the model without noise. `summary()` is a table of terms,
-    channels and actions. A copied or pickled environment is the same environment, and has to be reset.
+    channels and actions, as text. A copied or pickled environment is the same environment without an episode: it begins
+    with `reset`. Axes of a misalignment are those of the links: x along the straight forearm, z the hinge's own.
 
     ## Version History
     * v1: every number of an episode has a random stream of its own, so that other patients are drawn; physics, rewards
