@@ -136,6 +136,8 @@ class AssistanceVectorEnv(VectorEnv):
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):
             return [int(seed) + i for i in range(self.num_envs)]
+        if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+            raise InputError(f"seed = {seed!r}: expected a whole number, or one for each of {self.num_envs} worlds.")
         if len(seed) != self.num_envs:
             raise InputError(f"{len(seed)} seeds for {self.num_envs} worlds: expected one seed, or one a world.")
         return list(seed)

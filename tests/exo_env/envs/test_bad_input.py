@@ -177,3 +177,13 @@ def test_reset_options_are_a_copy():
     options["load"]["uniform"][:] = [3.0, 3.0]
     env.reset(seed=0)
     assert env.episode.load == 1.0
+
+
+@pytest.mark.parametrize(("seed", "complaint"), [(1.5, "seed = 1.5"), ("12", "seed = '12'"), ([1, 2, 3], "3 seeds")])
+def test_seeds_of_a_batch(seed, complaint):
+    worlds = ElbowLiftVectorEnv(2)
+    try:
+        with pytest.raises(InputError, match=complaint):
+            worlds.reset(seed=seed)
+    finally:
+        worlds.close()
