@@ -1,90 +1,35 @@
-"""The environments that policies act in, by id: the one place where they are looked up and made.
+"""The environments that policies act in, by id: the one place where they are made.
 
 Any environment that is registered with Gymnasium and has the face of this package will do; one of another package is
-named with the module that registers it, "module:namespace/Name-v0".
+named with the module that registers it, "module:namespace/Name-v0" (exo_env/envs/lookup.py).
 """
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Mapping
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import EnvSpec, load_env_creator, parse_env_id
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import exo_env  # noqa: F401  Importing it registers its environments.
-from dms_core.errors import InputError, choices
+from dms_core.errors import InputError
+from exo_env.envs.lookup import environment_id, environments, spec_of
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
+
+__all__ = (
+    "ENVIRONMENT", "PROGRAM", "check_settings", "environment_id", "environments", "make", "make_sb3_worlds",
+    "make_vector", "patient_seeds", "spec_of",
+)  # fmt: skip
 
 ENVIRONMENT = "exo/ElbowLift-v1"
 """The environment where none is named."""
 PROGRAM = f"python -m {__name__.partition('.')[0]}"
 """This command line, under the name by which it is installed."""
-
-
-def environment_id(environment: str, say: bool = True) -> str:
-    """The id under which an environment is registered now, in place of an older version of it.
-
-    Args:
-        environment: an id, with or without the module that registers it: "exo/ElbowLift-v1", "module:mine/Task-v1".
-        say: tell the user where a newer version takes the place of an older one.
-
-    Raises:
-        InputError: no environment of this name is registered, or the version is newer than those that are.
-    """
-    module, _, name = environment.rpartition(":")
-    if module:
-        try:
-            importlib.import_module(module)
-        except ImportError as error:
-            raise InputError(f"environment '{environment}': module '{module}' cannot be imported: {error}.") from None
-    newest = _newest(name)
-    if newest is None:
-        raise InputError(f"environment '{environment}' is not registered. There are: {choices(environments())}.")
-    if newest != name and say:
-        _say_once(f"note: {name} is now {newest}, which is used in its place.")
-    return newest
-
-
-def environments() -> list[str]:
-    """Ids of the environments that come with this package."""
-    return [name for name in gymnasium.registry if name.startswith("exo/")]
-
-
-def _newest(name: str) -> str | None:
-    """The id itself, the newest version where it is an older one, or None."""
-    try:
-        namespace, base, version = parse_env_id(name)
-    except gymnasium.error.Error:
-        return None
-    same = [s for s in gymnasium.registry.values() if (s.namespace, s.name) == (namespace, base)]
-    versions = {s.version: s.id for s in same if s.version is not None}
-    if name in gymnasium.registry and (version is None or name not in environments()):
-        return name
-    if version is None or not versions or version > max(versions):
-        return None
-    return versions[max(versions)]
-
-
-@cache
-def _say_once(sentence: str) -> None:
-    print(sentence, file=sys.stderr)
-
-
-def spec_of(environment: str) -> EnvSpec:
-    """What is registered under an id.
-
-    Raises:
-        InputError: there is nothing.
-    """
-    return gymnasium.spec(environment_id(environment))
 
 
 def make(environment: str, **settings: Any) -> gymnasium.Env:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from exo_env.patient.population import Source
-
-from ..environment import ENVIRONMENT
 from ..evaluation.evaluate import Plan, episodes_of, results_of
 from ..policies.policy import Policy
 from .cluster import share_out
@@ -16,30 +13,11 @@ LARGEST_SHARE = 10
 """Episodes of a share: some seconds, so that little is lost with a worker."""
 
 
-def evaluate_by_ray(
-    policies: Sequence[Policy],
-    patients_of: Source,
-    patients: int,
-    seed: int,
-    *,
-    loads: Sequence[float] = (),
-    environment: str = ENVIRONMENT,
-    address: str | None = None,
-    cpus: int | None = None,
-    progress: Callable[[str], None] | None = None,
-    **settings: Any,
-) -> dict[str, Any]:
-    """As `evaluate`; `address` and `cpus` as in `share_out`."""
-    plan = Plan(patients_of, patients, seed, tuple(loads), environment, settings)
-    return shared_out(policies, plan, address=address, cpus=cpus, progress=progress)
-
-
 def shared_out(
     policies: Sequence[Policy],
     plan: Plan,
     *,
     address: str | None = None,
-    cpus: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """What `evaluate` returns.
@@ -48,7 +26,6 @@ def shared_out(
         policies: to compare.
         plan: what they are run on.
         address: of a cluster, as in `share_out`.
-        cpus: of a local one.
         progress: called with the name of the policy after each episode.
     """
     cases = plan.cases
@@ -60,7 +37,7 @@ def shared_out(
             for _ in shares[k][2]:
                 progress(shares[k][0].name)
 
-    results = share_out(episodes_of, shares, address=address, cpus=cpus, done=done)
+    results = share_out(episodes_of, shares, address=address, done=done)
     n = len(parts)
     joined = [[e for part in results[k * n : (k + 1) * n] for e in part] for k in range(len(policies))]
     return results_of(policies, joined, plan)

@@ -7,12 +7,13 @@ from typing import Any
 
 import gymnasium
 
+from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.patient.population import Source
-from exo_env.tasks.repetition import Repetition
+from exo_env.tasks.repetition import MOVED, Repetition, Repetitions
 
 from ..environment import ENVIRONMENT, make
 from ..policies.policy import Policy
-from .measures import MOVEMENT, Record, left_out, measured
+from .measures import Record, left_out, measured
 
 ABOUT = ("load", "ability", "reference", "patient")
 """What is kept of the `info` of a reset, where it is in there."""
@@ -49,7 +50,7 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
     observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
     info = drawn
     acting.reset(env)
-    record = Record(movement_of(env, drawn), world.period)
+    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
     record.add(world.readings())
     over = False
     while not over:
@@ -72,9 +73,17 @@ def judged(env: gymnasium.Env, acting: Policy, seeds: Sequence[int]) -> list[dic
 
 
 def movement_of(env: gymnasium.Env, drawn: dict[str, Any]) -> Repetition | None:
-    """The movement of an episode as a reset tells it, None where the environment has none."""
-    if MOVEMENT not in drawn:
-        return None
+    """The repetitions of an episode.
+
+    Args:
+        env: in which.
+        drawn: `info` of its reset.
+
+    Returns:
+        None where the patient's movement is another one, or a reset does not tell it.
+    """
     world: Any = env.unwrapped
-    count = 1 if env.spec is None else int(env.spec.kwargs.get("repetitions", 1))
-    return Repetition(**drawn[MOVEMENT], count=count, every=world.duration / count)
+    if not isinstance(world.movement, Repetitions) or "reference" not in drawn:
+        return None
+    count, every = world.movement.episode_numbers(world.duration)
+    return Repetition(**{name: drawn["reference"][name] for name in MOVED}, count=int(count), every=every)

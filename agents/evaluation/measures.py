@@ -4,8 +4,8 @@ Work is mechanical and positive: of each party, the integral of the positive par
 Shares are of the sum of both, so that a party which brakes the other earns nothing. An episode that an event cuts short
 is measured up to its end.
 
-Some measures need readings that not every environment has; where one is missing, the measure is left out. Return,
-reward terms, unsafe episodes, solver failures and length are always there.
+Some measures need readings that not every environment has, and smoothness a movement of lifts and returns; where one
+is missing, the measure is left out. Return, reward terms, unsafe episodes, solver failures and length are always there.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ FEWEST_SAMPLES = 8
 """Samples that a speed profile needs at least for a smoothness."""
 REWARD = "reward."
 """Before the name of a reward term."""
-MOVEMENT = "reference"
-"""What `info` of a reset calls the movement, which smoothness needs beside the readings."""
+REPETITIONS = "repetitions"
+"""Name among what a measure needs for a movement of lifts and returns, which is no reading."""
+TENSION = "tension"
+"""Name of the largest tension of all ropes of the device [N], which `Record` takes of their readings."""
 
 
 @dataclass
@@ -35,7 +37,9 @@ class Record:
     """Readings of an episode, one a control time."""
 
     repetition: Repetition | None
-    """The movement, None where the environment has none."""
+    """The movement, None where it is no repetition."""
+    tensions: tuple[str, ...]
+    """Name of the tension's reading of each rope of the device."""
     period: float
     """Control period [s]."""
     readings: list[dict[str, float]] = field(default_factory=list)
@@ -47,7 +51,10 @@ class Record:
 
     def add(self, readings: Mapping[str, float]) -> None:
         """The readings of a control time."""
-        self.readings.append({name: readings[name] for name in READ if name in readings})
+        kept = {name: readings[name] for name in READ if name in readings}
+        if self.tensions and all(name in readings for name in self.tensions):
+            kept[TENSION] = max(readings[name] for name in self.tensions)
+        self.readings.append(kept)
 
     def add_step(self, reward: float, info: Mapping[str, Any]) -> None:
         """What a step gave."""
@@ -62,9 +69,9 @@ class Record:
         return np.array([r[name] for r in self.readings])
 
     def lacks(self, reads: Iterable[str]) -> list[str]:
-        """Which of some readings the environment does not have."""
-        here = self.readings[0].keys() if self.readings else ()
-        return [name for name in reads if name not in here and not (name == MOVEMENT and self.repetition is not None)]
+        """Which of some readings the environment does not have; REPETITIONS where its movement is another one."""
+        here = {*(self.readings[0] if self.readings else ()), *([] if self.repetition is None else [REPETITIONS])}
+        return [name for name in reads if name not in here]
 
 
 @dataclass(frozen=True)
@@ -77,7 +84,7 @@ class Measure:
     of: Callable[[Record], float]
     """Its number for an episode, NaN where it cannot be had."""
     reads: tuple[str, ...] = ()
-    """Readings that it needs."""
+    """Readings that it needs, TENSION and REPETITIONS among them."""
     rate: bool = False
     """The numbers are 0 or 1, whose mean says how many; their interquartile mean would hide the few."""
 
@@ -99,35 +106,30 @@ def _shares(record: Record) -> tuple[float, float]:
     return (device / both, patient / both) if both > 0.0 else (math.nan, math.nan)
 
 
-def _peak_tension(record: Record) -> float:
-    return float(max(record.column("agonist_tension").max(), record.column("antagonist_tension").max()))
-
-
 def _smoothness(record: Record) -> float:
     assert record.repetition is not None
     return smoothness(record.repetition, record.column("time"), record.column("elbow_angle.rate"), record.period)
 
 
 WORK = ("time", "muscle_moment", "elbow_angle.rate", "exo_moment", "exo_angle.rate")
-TENSIONS = ("agonist_tension", "antagonist_tension")
 MEASURES = (
     Measure("return", "return", "-", lambda r: math.fsum(r.rewards)),
     Measure("tracking_rms_deg", "tracking, rms", "deg", _tracking_rms, ("tracking_error",)),
     Measure("tracking_peak_deg", "tracking, peak", "deg", _tracking_peak, ("tracking_error",)),
     Measure("device_work_share", "work of the device", "-", lambda r: _shares(r)[0], WORK),
     Measure("patient_work_share", "work of the patient", "-", lambda r: _shares(r)[1], WORK),
-    Measure("peak_tension_N", "peak tension", "N", _peak_tension, TENSIONS),
+    Measure("peak_tension_N", "peak tension", "N", lambda r: float(r.column(TENSION).max()), (TENSION,)),
     Measure(
         "peak_reaction_N", "peak elbow reaction", "N", lambda r: float(r.column("elbow_reaction").max()),
         ("elbow_reaction",),
     ),
-    Measure("smoothness_sparc", "smoothness (SPARC)", "-", _smoothness, ("time", "elbow_angle.rate", MOVEMENT)),
+    Measure("smoothness_sparc", "smoothness (SPARC)", "-", _smoothness, ("time", "elbow_angle.rate", REPETITIONS)),
     Measure("unsafe", "unsafe episodes", "-", lambda r: float(r.event is not None), rate=True),
     Measure("solver_failures", "solver failures", "-", lambda r: float(r.solver_failed), rate=True),
     Measure("length_s", "length of the episode", "s", lambda r: len(r.rewards) * r.period),
 )  # fmt: skip
-READ = tuple(dict.fromkeys(name for m in MEASURES for name in m.reads if name != MOVEMENT))
-"""Readings that are kept."""
+READ = tuple(dict.fromkeys(name for m in MEASURES for name in m.reads if name not in (TENSION, REPETITIONS)))
+"""Readings that are kept as they are."""
 
 
 def measured(record: Record) -> dict[str, float]:

@@ -12,7 +12,7 @@ from typing import Any
 from ..environment import ENVIRONMENT
 from ..policies.baselines import POLICIES
 from .evaluate import COMPARED, able_ones, differences
-from .measures import MEASURES, measures_among
+from .measures import MEASURES, REPETITIONS, measures_among
 from .statistics import Estimate
 
 OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
@@ -74,10 +74,12 @@ def left_out_lines(results: Mapping[str, Any]) -> list[str]:
     if not left:
         return []
     labels = {m.name: m.label for m in MEASURES}
-    lacking = dict.fromkeys(reading for readings in left.values() for reading in readings)
+    lacking = list(dict.fromkeys(what for needs in left.values() for what in needs))
+    readings = ", ".join(name for name in lacking if name != REPETITIONS)
+    missing = [f"no reading {readings}"] * bool(readings) + ["no repetitions of a lift"] * (REPETITIONS in lacking)
     return [
         f"Left out: {', '.join(labels.get(name, name) for name in left)}; "
-        f"{results['environment']} has no reading {', '.join(lacking)}."
+        f"{results['environment']} has {' and '.join(missing)}."
     ]
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, SimulationError, choices
-from exo_env.tasks.repetition import Repetition
+from exo_env.tasks.repetition import MOVED, Repetition, Repetitions
 from exo_env.world.episode import Episode
 
 from ..environment import ENVIRONMENT, make_vector, patient_seeds
@@ -108,7 +108,7 @@ def upper_bound(
         What came of each patient, and the schedules, shape (TRIES, 4).
 
     Raises:
-        InputError: the environment lacks a reading that is needed.
+        InputError: the environment lacks a reading that is needed, or its movement is no repetition.
     """
     worlds = make_vector(
         environment, TRIES, action_mode="pid_setpoint", patient=population, repetitions=repetitions,
@@ -142,8 +142,11 @@ def tried_on(worlds: Any, seed: int, tried: np.ndarray, n: int = 1) -> Tried:
     lacking += ["reference"] if "reference" not in drawn else []
     if lacking:
         raise InputError(f"an upper bound needs readings that this environment does not have: {choices(lacking)}.")
+    if not isinstance(envs[0].movement, Repetitions):
+        kind = type(envs[0].movement).__name__
+        raise InputError(f"an upper bound needs a movement of Repetitions; that of this environment is {kind}.")
     episode, period = envs[0].episode, envs[0].period
-    numbers: dict[str, Any] = {k: float(x[0]) for k, x in drawn["reference"].items() if not k.startswith("_")}
+    numbers: dict[str, Any] = {name: float(drawn["reference"][name][0]) for name in MOVED}
     movement = Repetition(**numbers)
     times = episode.times[:-1]
     shape, up, steps = (n, TRIES), movement.rest + movement.duration, len(times) // n

@@ -65,12 +65,12 @@ class AssistAsNeeded(Policy):
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
         """Tensions that give the moment; the weights learn from the present error."""
         names = ("angle", "rate", "reference", "reference_rate")
-        angle, rate, reference, reference_rate = (self._channels.read(observation, n) for n in names)
+        angle, rate, reference, reference_rate = (self._channels.read(observation, f"device.{n}") for n in names)
         error, error_rate = reference - angle, reference_rate - rate
         if self.weights is None:
             rope = self._device.lifting_rope
             place = list(self._device.ropes).index(rope)
-            held = self._channels.read(observation, "tension", place) * self._device.moment_arm(rope, angle)
+            held = self._channels.read(observation, "device.tension", place) * self._device.moment_arm(rope, angle)
             self.weights = np.full(CENTRES.size, held)
         basis = gaussians(angle)
         self.learn(basis, error, error_rate)

@@ -82,7 +82,7 @@ class CompensatedPid(Policy):
         """The setpoint change that stands for the holding tension and the lag, and the authority."""
         if self._tensions is None:
             self._tensions = self._table(observation)
-        held = float(np.interp(self._channels.read(observation, "preview", AHEAD), ANGLES, self._tensions))
+        held = float(np.interp(self._channels.read(observation, "device.preview", AHEAD), ANGLES, self._tensions))
         gains = self._ecosystem.device.gains
         change = (self.share * held - gains.ki * self._integral) / gains.kp
         change = min(max(change, self.lag - self._range), self._range)
@@ -92,5 +92,5 @@ class CompensatedPid(Policy):
     def _table(self, observation: np.ndarray) -> np.ndarray:
         """Holding tension of this patient and load over ANGLES [N]."""
         read = self._channels.read
-        person = Person(body_mass=read(observation, "body_mass"), height=read(observation, "height"))
-        return holding_tensions(self._ecosystem, person, read(observation, "load"), ANGLES)
+        mass, height, load = (read(observation, f"privileged.{name}") for name in ("body_mass", "height", "load"))
+        return holding_tensions(self._ecosystem, Person(body_mass=mass, height=height), load, ANGLES)

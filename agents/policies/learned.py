@@ -44,7 +44,7 @@ class Description(Settings):
     exo_env: str = Field(description="version it was trained with")
     env_kwargs: dict[str, Any] = Field(description="of the training environment")
     action_mode: str
-    observation: tuple[str, ...] = Field(description="groups, in order")
+    observation: tuple[str, ...] = Field(description="groups, or channels as group.channel, in order")
     structure: tuple[dict[str, Any], ...] = Field(description="of the observation: names, units, scales")
     period: float = Field(gt=0.0, description="control period [s]")
     drive: dict[str, Any] = Field(description="what actions command")
@@ -66,7 +66,7 @@ def world_facts(env: gymnasium.Env) -> dict[str, Any]:
     parts = [json.loads(json.dumps(part.as_dict())) for part in world.observation_structure]
     return {
         "action_mode": world.action_mode,
-        "observation": tuple(dict.fromkeys(part["group"] for part in parts)),
+        "observation": tuple(map(str, world.settings.observation)),
         "structure": tuple(parts),
         "period": world.period,
         "drive": world.drive.model_dump(mode="json"),

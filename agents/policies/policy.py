@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 
+from dms_core.errors import InputError, choices
+
 from .tuned import Range
 
 
@@ -25,7 +27,7 @@ class Policy(ABC):
     action_mode: ClassVar[str]
     """Action mode of the environment that it acts in."""
     observation: ClassVar[tuple[str, ...]] = ("device",)
-    """Groups of the observation that it sees."""
+    """Groups of the observation that it sees, or single channels as "group.channel"."""
     ranges: ClassVar[dict[str, Range]] = {}
     """Where its numbers may lie, which `python -m agents tune-baselines` searches; arguments of its constructor."""
 
@@ -52,9 +54,20 @@ class Channels:
 
     def __init__(self, env: gymnasium.Env) -> None:
         world: Any = env.unwrapped
-        self._slices = {part.name: part for part in world.observation_structure}
+        self._slices = {f"{part.group}.{part.name}": part for part in world.observation_structure}
 
     def read(self, observation: np.ndarray, name: str, component: int = 0) -> float:
-        """One component of a channel [unit of the channel]."""
+        """One component of a channel [unit of the channel].
+
+        Args:
+            observation: of the environment.
+            name: of the channel, as "group.channel": two groups may have channels of one name.
+            component: its place in the channel.
+
+        Raises:
+            InputError: the channel is not observed.
+        """
+        if name not in self._slices:
+            raise InputError(f"the policy reads '{name}', which is not observed; there are {choices(self._slices)}.")
         part = self._slices[name]
         return float(observation[part.start + component]) * part.scale

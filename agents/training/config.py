@@ -53,7 +53,7 @@ class Training(Settings):
         default=None,
         description="action whose reward on the same patient is taken off that of training; None: none",
     )
-    critic: tuple[str, ...] = Field(default=(), description="groups of the observation that only PPO's critic sees")
+    critic: tuple[str, ...] = Field(default=(), description="groups or channels that only PPO's critic sees")
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?|mps|auto)$", description="of PyTorch")
 
 

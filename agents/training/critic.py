@@ -15,6 +15,8 @@ from stable_baselines3.common.torch_layers import MlpExtractor
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
+from dms_core.errors import InputError, choices
+
 
 class TwoViews(nn.Module):
     """Layers of actor and critic, each behind its own part of the observation.
@@ -75,10 +77,22 @@ def actor_size(worlds: VecEnv, critic: Sequence[str]) -> int:
 
     Args:
         worlds: that are observed.
-        critic: groups that only the critic sees.
+        critic: what only the critic sees: groups, or single channels as "group.channel".
+
+    Raises:
+        InputError: one of these is not observed, or the actor sees something that stands behind them.
     """
     parts = worlds.get_attr("observation_structure", 0)[0]
-    return sum(part.stop - part.start for part in parts if part.group not in critic)
+    single = [f"{part.group}.{part.name}" for part in parts]
+    for name in critic:
+        if name not in {*single, *(part.group for part in parts)}:
+            groups = dict.fromkeys(part.group for part in parts)
+            raise InputError(f"training.critic: '{name}' is not observed; there are {choices([*groups, *single])}.")
+    hidden = [part.group in critic or name in critic for part, name in zip(parts, single, strict=True)]
+    if hidden != sorted(hidden):
+        order = ", ".join(single)
+        raise InputError(f"training.critic: expected what only the critic sees behind all else, got {order}.")
+    return sum(part.stop - part.start for part, only in zip(parts, hidden, strict=True) if not only)
 
 
 def seen_places(worlds: VecEnv, critic: Sequence[str], filters: int) -> list[int]:

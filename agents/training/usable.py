@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from dms_core.errors import DmsError, InputError, extra
 
@@ -36,11 +38,21 @@ def checked_config(path: Path, changes: tuple[str, ...], environment: str | None
         InputError: names file, key and value.
     """
     from .algorithms import arguments
+    from .worlds import observed_settings
 
     config = Config.read(path, changes, environment)
     try:
         arguments(config)
         check_settings(config.environment, config.env_kwargs)
+        _check_critic(config.environment, observed_settings(config))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return config
+
+
+def _check_critic(environment: str, settings: Mapping[str, Any]) -> None:
+    """Refuses settings of worlds whose observation, that of the critic included, is not possible."""
+    try:
+        check_settings(environment, settings)
+    except InputError as error:
+        raise InputError(f"training.critic: {error}") from None

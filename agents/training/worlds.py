@@ -9,7 +9,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecMonitor, 
 
 from dms_core.errors import InputError
 
-from ..environment import ENVIRONMENT, make_sb3_worlds, spec_of
+from ..environment import ENVIRONMENT, make, make_sb3_worlds
 from .algorithms import arguments
 from .config import Config
 from .critic import actor_size
@@ -46,16 +46,24 @@ def training_worlds(
     return VecMonitor(worlds)
 
 
+def observed_settings(config: Config) -> dict[str, Any]:
+    """Settings of the training worlds: what only the critic sees stands behind what the policy sees."""
+    if not config.training.critic:
+        return config.env_kwargs
+    env: Any = make(config.environment, **config.env_kwargs)
+    own = env.unwrapped.settings.observation
+    env.close()
+    return config.env_kwargs | {"observation": [*own, *config.training.critic]}
+
+
 def wrapped(config: Config, seed: int) -> VecEnv:
     """Training worlds of a configuration, observations stacked and then normalised if it says so.
 
     rl_zoo3 normalises first; then algorithms with a replay buffer could not have both.
     """
     arguments(config)
-    registered = spec_of(config.environment).kwargs.get("observation", ("device",))
-    own, more = list(config.env_kwargs.get("observation", registered)), config.training.critic
-    settings, against = config.env_kwargs | {"observation": [*own, *more]}, config.training.against
-    worlds = training_worlds(settings, config.n_envs, seed, against, config.environment)
+    more, against = config.training.critic, config.training.against
+    worlds = training_worlds(observed_settings(config), config.n_envs, seed, against, config.environment)
     single: Any = worlds.action_space
     for name, action in (("start", config.training.start), ("against", against)):
         if action is not None and len(action) != single.shape[0]:

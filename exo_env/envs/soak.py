@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-import gymnasium
 import numpy as np
 from gymnasium.envs.registration import load_env_creator
 
 from dms_core.errors import InputError, choices
 from exo_env.envs.base_env import AssistanceEnv
+from exo_env.envs.lookup import environments, spec_of
 from exo_env.tables import STATUS
 from exo_env.tasks.task import FIRST_EVENT, NOTHING, SOLVER
 
@@ -81,27 +80,15 @@ def _made(name: str, settings: dict[str, Any]) -> AssistanceEnv:
     Raises:
         InputError: there is no such environment, or it is none of AssistanceEnv.
     """
-    module, _, plain = name.rpartition(":")
-    try:
-        if module:
-            importlib.import_module(module)
-        spec = gymnasium.spec(plain)
-    except (gymnasium.error.Error, ImportError) as error:
-        right = f"expected one of {choices(_ids())}, or 'module:id' of an environment of one's own"
-        raise InputError(f"env = {name!r}: {right} ({error})") from None
+    spec = spec_of(name)
     maker = load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
     if not (isinstance(maker, type) and issubclass(maker, AssistanceEnv)):
         raise InputError(
-            f"env = {name!r}: expected an environment that is an AssistanceEnv, such as {choices(_ids())}."
+            f"env = {name!r}: expected an environment that is an AssistanceEnv, such as {choices(environments())}."
         )
     fixed = {**spec.kwargs, **settings}
     groups = list(maker(**fixed).task.groups)
     return maker(**{"observation": groups, **fixed})
-
-
-def _ids() -> list[str]:
-    """Ids of the shipped environments."""
-    return [name for name in gymnasium.registry if name.startswith("exo/")]
 
 
 def _end(env: AssistanceEnv, truncated: bool) -> str:

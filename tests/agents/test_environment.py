@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import register
 
-from agents import environment
 from agents.environment import ENVIRONMENT, check_settings, environment_id, make, make_vector
 from agents.policies.learned import find_policy
 from agents.training.config import Config
 from dms_core.errors import InputError
+from exo_env.envs import lookup
 from tests.agents.other_environments import LIFT
 from tests.agents.tiny import content
 
@@ -19,7 +19,7 @@ NEXT = "exo/ElbowLift-v9"
 @pytest.fixture
 def newer(monkeypatch):
     """The environment under its next version, as the only one."""
-    environment._say_once.cache_clear()
+    lookup._say_once.cache_clear()
     register(
         id=NEXT, entry_point=LIFT.entry_point, vector_entry_point=LIFT.vector_entry_point, disable_env_checker=True
     )
@@ -27,7 +27,7 @@ def newer(monkeypatch):
     monkeypatch.setattr("agents.training.config_file.ENVIRONMENT", NEXT)
     yield
     del gymnasium.registry[NEXT]
-    environment._say_once.cache_clear()
+    lookup._say_once.cache_clear()
 
 
 def test_the_default_is_registered():

@@ -118,6 +118,9 @@ def test_tasks_devices_forces_arms_and_patients_of_its_own(run, without_the_lift
     for each in (still, two):
         assert each["equal"] and each["steps"] == 60 and not each["reference_seen"]
         assert np.isfinite(each["rewards"]).all() and each["rewards"][0] < each["rewards"][1]
+        # Nobody lifts anything, so there is no smoothness of a lift.
+        assert each["left_out"] == {"smoothness_sparc": ["repetitions"]}
+        assert np.isfinite([each["measures"][k] for k in ("return", "reward.stillness", "peak_tension_N")]).all()
     assert still["actions"] == 3 and still["water"] and 0.02 <= still["tremor"] <= 0.05
     assert still["observed"][-1] == "sum.total_tension"
     assert two["actions"] == 2 and two["muscles"] == ["TRIlat", "BRA"] and not two["water"]

@@ -15,8 +15,8 @@ pytest.importorskip("ray")
 
 from agents.__main__ import main
 from agents.distributed.cluster import share_out
-from agents.distributed.shared_evaluation import evaluate_by_ray
-from agents.evaluation.evaluate import evaluate
+from agents.distributed.shared_evaluation import shared_out
+from agents.evaluation.evaluate import Plan, evaluate
 from agents.policies.baselines import policy
 from dms_core.errors import DmsError, InputError
 from tests.agents.tiny import config_file
@@ -60,7 +60,7 @@ def test_evaluation_is_that_of_one_process(monkeypatch):
     monkeypatch.setattr("agents.distributed.shared_evaluation.LARGEST_SHARE", 2)
     names, seen = ["pid", "none"], []
     used = [policy(n) for n in names]
-    shared = evaluate_by_ray(used, "evaluation", 3, 4, cpus=2, progress=seen.append, **SHORT)
+    shared = shared_out(used, Plan("evaluation", 3, 4, settings=SHORT), progress=seen.append)
     alone = evaluate([policy(n) for n in names], "evaluation", 3, 4, **SHORT)
     assert json.dumps(shared) == json.dumps(alone) and sorted(seen) == sorted(names * 3)
 

@@ -5,10 +5,25 @@ import math
 import numpy as np
 import pytest
 
-from agents.evaluation.measures import READ, Record, measured, positive_work, smoothness, sparc
+from agents.environment import ENVIRONMENT, make
+from agents.evaluation.episode import episode
+from agents.evaluation.measures import (
+    READ,
+    REPETITIONS,
+    TENSION,
+    Record,
+    left_out,
+    measured,
+    positive_work,
+    smoothness,
+    sparc,
+)
+from agents.policies.policy import Policy
+from dms_core.config_files import configs
 from exo_env.tasks.repetition import Repetition
 
 FREQUENCY = 100.0
+ROPES = ("agonist_tension", "antagonist_tension", "helper_tension")
 
 
 def bump(duration=1.0, frequency=FREQUENCY):
@@ -95,22 +110,23 @@ def record_of(**columns):
     """An episode of 3 s with these readings; all others are 0."""
     times = np.arange(0.0, 3.0, 0.02)
     given = {"time": times, **columns}
-    record = Record(Repetition(), 0.02)
+    record = Record(Repetition(), ROPES, 0.02)
     for k in range(len(times)):
-        record.add({name: float(np.broadcast_to(given.get(name, 0.0), times.shape)[k]) for name in READ})
+        record.add({name: float(np.broadcast_to(given.get(name, 0.0), times.shape)[k]) for name in (*READ, *ROPES)})
     return record
 
 
 def test_measures_of_a_made_up_episode():
     record = record_of(
         **{"elbow_angle.rate": 2.0, "exo_angle.rate": 2.0, "muscle_moment": 1.0, "exo_moment": 3.0},
-        tracking_error=math.radians(-5.0), agonist_tension=7.0, antagonist_tension=9.0, elbow_reaction=400.0,
+        tracking_error=math.radians(-5.0), agonist_tension=7.0, antagonist_tension=9.0, helper_tension=150.0,
+        elbow_reaction=400.0,
     )  # fmt: skip
     record.rewards, record.event = [1.0, 2.5], "The rope broke."
     found = measured(record)
     expected = {
         "return": 3.5, "tracking_rms_deg": 5.0, "tracking_peak_deg": 5.0, "device_work_share": 0.75,
-        "patient_work_share": 0.25, "peak_tension_N": 9.0, "peak_reaction_N": 400.0, "unsafe": 1.0,
+        "patient_work_share": 0.25, "peak_tension_N": 150.0, "peak_reaction_N": 400.0, "unsafe": 1.0,
     }  # fmt: skip
     # Constants: only round-off.
     assert {k: found[k] for k in expected} == pytest.approx(expected, rel=1e-12)
@@ -121,3 +137,40 @@ def test_braking_is_no_share_of_the_work():
         record_of(**{"elbow_angle.rate": 2.0, "exo_angle.rate": 2.0, "muscle_moment": 1.0}, exo_moment=-3.0)
     )
     assert (found["device_work_share"], found["patient_work_share"]) == (0.0, 1.0)
+
+
+def test_what_an_environment_does_not_have_is_left_out_and_named():
+    record = Record(None, ROPES, 0.02)
+    record.add(dict.fromkeys((*READ, *ROPES[:2]), 1.0))
+    # The peak over two of three ropes would be a wrong number.
+    assert left_out(record) == {"peak_tension_N": [TENSION], "smoothness_sparc": [REPETITIONS]}
+
+
+class OnlyTheHelper(Policy):
+    """The third rope pulls, and the other two are slack; the tension that it reaches is kept."""
+
+    title, action_mode = "helper", "rope_tension"
+
+    def reset(self, env):
+        self.world, self.reached = env.unwrapped, [env.unwrapped.readings()]
+
+    def __call__(self, observation, info):
+        self.reached.append(self.world.readings())
+        return np.array([-1.0, -1.0, 1.0])
+
+
+def test_the_peak_tension_is_that_of_any_rope_of_the_device():
+    device = configs().parent / "tests" / "outside" / "steady" / "three_ropes.yaml"
+    env = make(
+        ENVIRONMENT, exoskeleton=str(device), drive_settings={"max_tension": [200.0, 100.0, 150.0]},
+        patient="stroke_mild", episode_duration=0.4,
+    )  # fmt: skip
+    acting = OnlyTheHelper()
+    found = episode(env, acting, 0)["measures"]["peak_tension_N"]
+    acting.reached.append(env.unwrapped.readings())
+    env.close()
+    helper, others = (
+        max(r[f"{rope}_tension"] for r in acting.reached for rope in ropes)
+        for ropes in (["helper"], ["agonist", "antagonist"])
+    )
+    assert found == helper > others

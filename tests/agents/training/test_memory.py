@@ -1,5 +1,7 @@
 """Filtered observations, held actions, and a critic that sees more: in the worlds of a training and in its policy."""
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 import pytest
@@ -8,12 +10,16 @@ from gymnasium import spaces
 from agents.__main__ import main
 from agents.policies.network import Architecture, Network
 from agents.training.config import Config
+from dms_core.errors import InputError
 from tests.agents.tiny import config_file, content
 
 pytest.importorskip("sb3_contrib")
 
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from agents.environment import ENVIRONMENT, make_sb3_worlds
+from agents.training.critic import actor_size, seen_places
+from agents.training.worlds import observed_settings, wrapped
 from agents.training.wrappers.action_repeat import ActionRepeat
 from agents.training.wrappers.low_pass import LowPassObservations, kept_shares
 
@@ -127,3 +133,50 @@ def test_a_critic_of_its_own_is_for_ppo_alone(tmp_path, capsys):
         assert main(["train", "--config", str(file), "--out", str(tmp_path / "run")]) == 2
         assert "training.critic" in capsys.readouterr().err
         assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    "critic, actor",
+    [(("privileged.load",), 12), (("privileged",), 12), (("device.last_action", "privileged"), 10), ((), 13)],
+)
+def test_a_channel_of_the_critic_is_hidden_from_the_actor(critic, actor):
+    # 12 numbers of the device, of which the last two are its last action, and the load.
+    worlds = make_sb3_worlds(ENVIRONMENT, 1, observation=["device", "privileged.load"])
+    assert actor_size(worlds, critic) == actor and seen_places(worlds, critic, 0) == list(range(actor))
+    with pytest.raises(InputError, match=r"'load' is not observed; there are device, device\.angle"):
+        actor_size(worlds, ["load"])
+    with pytest.raises(InputError, match="expected what only the critic sees behind all else"):
+        actor_size(worlds, ["device"])
+    worlds.close()
+
+
+def test_a_critic_of_one_channel_is_trained_with(tmp_path):
+    found = content("ppo", {"critic": ["privileged.load"]}, env_kwargs={"observation": ["device.angle", "emg"]})
+    worlds = wrapped(Config.of(found, "ppo"), 0)
+    # An angle and six activations.
+    assert actor_size(worlds, ["privileged.load"]) == 7 and worlds.observation_space.shape == (8,)
+    worlds.close()
+
+
+def test_the_critic_sees_more_than_what_the_environment_shows_by_itself(monkeypatch):
+    from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftSettings
+
+    class Narrow(ElbowLiftSettings):
+        observation: Any = ("device.angle",)
+
+    monkeypatch.setattr(ElbowLiftEnv, "settings_type", Narrow)
+    config = Config.of(content("ppo", {"critic": ["privileged"]}), "ppo")
+    assert observed_settings(config)["observation"] == ["device.angle", "privileged"]
+    assert "observation" not in observed_settings(Config.of(content("ppo"), "ppo"))
+
+
+@pytest.mark.parametrize(
+    "name, said",
+    [("load", "group 'load' is unknown"), ("privileged.wings", "has no channel 'wings'"), ("device.angle", "twice")],
+)
+def test_a_name_that_the_critic_cannot_see_is_refused_before_a_folder_is_made(name, said, tmp_path, capsys):
+    file = config_file(tmp_path, "ppo", {"critic": [name]})
+    assert main(["train", "--config", str(file), "--out", str(tmp_path / "run")]) == 2
+    errors = capsys.readouterr().err
+    assert "training.critic: observation" in errors and said in errors and errors.count("\n") == 1
+    assert not (tmp_path / "run").exists()

@@ -6,6 +6,7 @@ import yaml
 
 from dms_core.config_files import config_file
 from exo_env.__main__ import main
+from exo_env.envs import lookup
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 
 
@@ -36,6 +37,12 @@ def test_an_environment_of_ones_own_is_found_by_its_id(own_env, capsys):
     assert found["episodes"] == "4" and found["ends"] == "{'time': 4}"
 
 
+def test_an_older_version_is_looked_up_as_everywhere(capsys):
+    lookup._say_once.cache_clear()
+    assert main(["soak", "--steps", "5", "--env", "exo_env:exo/ElbowLift-v0"]) == 0
+    assert "exo/ElbowLift-v0 is now exo/ElbowLift-v1" in capsys.readouterr().err
+
+
 def test_a_device_of_ones_own_and_another_drive(tmp_path, capsys):
     device = yaml.safe_load(config_file("exoskeletons/elbow.yaml").read_text())
     device["lower_link"]["mass"] *= 1.5
@@ -49,8 +56,8 @@ def test_a_device_of_ones_own_and_another_drive(tmp_path, capsys):
     ("arguments", "complaint"),
     [
         (["--steps", "0"], "--steps 0: expected a whole number from 1"),
-        (["--env", "exo/Nothing-v0"], "env = 'exo/Nothing-v0': expected one of exo/ElbowLift-v1"),
-        (["--env", "no_such_module:a/B-v0"], "env = 'no_such_module:a/B-v0': expected one of exo/ElbowLift-v1"),
+        (["--env", "exo/Nothing-v0"], "environment 'exo/Nothing-v0' is not registered. There are: exo/ElbowLift-v1"),
+        (["--env", "no_such_module:a/B-v0"], "module 'no_such_module' cannot be imported"),
         (["--env", "CartPole-v1"], "env = 'CartPole-v1': expected an environment that is an AssistanceEnv"),
         (["--exoskeleton", "leg"], "exoskeleton = 'leg': expected one of elbow"),
     ],

@@ -8,6 +8,9 @@ import time
 
 import gymnasium
 import numpy as np
+from exo_agents.evaluation.evaluate import evaluate
+from exo_agents.policies.baselines import policy
+from steady import FOLDER
 
 STEPS, WORLDS = 60, 3
 
@@ -49,6 +52,13 @@ def info_of(env: gymnasium.Env) -> dict:
     return env.reset(seed=4)[1]
 
 
+def evaluation(name: str) -> dict:
+    """One episode without assistance, as the shipped command measures it, and what it leaves out."""
+    found = evaluate([policy("none")], str(FOLDER / "tremor.yaml"), 1, 0, environment=f"steady:steady/{name}")
+    (episode,) = found["policies"]["none"]["episodes"]
+    return {"left_out": found["left_out"], "measures": episode["measures"]}
+
+
 def cost(name: str, settings: dict) -> float:
     """CPU time of a step in a batch of 8 [s], the best of five rounds."""
     batch = gymnasium.make_vec(name, num_envs=8, threads=1, **settings)
@@ -64,7 +74,7 @@ def cost(name: str, settings: dict) -> float:
 
 
 if __name__ == "__main__":
-    found = {name: run(f"{name}-v0") for name in ("HoldStill", "TwoMuscles")}
+    found = {name: run(f"{name}-v0") | evaluation(f"{name}-v0") for name in ("HoldStill", "TwoMuscles")}
     if "--speed" in sys.argv:
         shipped = {"observation": ["device"], "patient": "stroke_mild", "episode_duration": 2.0}
         found["ratio"] = cost("steady:steady/HoldStill-v0", {}) / cost("exo_env:exo/ElbowLift-v1", shipped)
