@@ -12,6 +12,7 @@ from dms_core.errors import InputError, choices
 from exo_env.drives.drive import Command, Drive, affine
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.kernel_checks import check_kernel, uses
+from exo_env.plain import plain
 
 
 def check_drive(drive: Drive, device: Exoskeleton) -> None:
@@ -28,7 +29,7 @@ def check_drive(drive: Drive, device: Exoskeleton) -> None:
         _check_command(f"{who}: command '{command.name}'", command)
     numbers = drive.numbers(device)
     if not isinstance(numbers, np.ndarray) or numbers.dtype.kind not in "fiu" or not np.isfinite(numbers).all():
-        raise InputError(f"{who}: numbers = {numbers!r}; expected an array of finite numbers.")
+        raise InputError(f"{who}: numbers = {plain(numbers)!r}; expected an array of finite numbers.")
     if uses(kernel, affine):
         _check_affine(who, numbers, len(actions), commands, exact=kernel is affine)
 

@@ -68,7 +68,7 @@ def check_readings(task: str, readings: Sequence[Reading]) -> None:
         if not _words(r.sensors) or len(r.sensors) not in (0, len(r.labels)):
             raise InputError(
                 f"{who}: sensors = {r.sensors!r}; expected none, or a tuple with one for each of its "
-                f"{len(r.labels)} components {r.labels}."
+                f"{len(r.labels)} components: {', '.join(r.labels)}."
             )
         if r.trait is not None and r.trait not in FIELDS:
             raise InputError(f"{who}: trait '{r.trait}' is unknown; a patient has {choices(FIELDS)}.")
