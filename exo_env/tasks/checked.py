@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from numbers import Integral, Real
 from typing import Any
 
 from dms_core.errors import InputError, choices
 from exo_env.kernel_checks import check_kernel, uses
 from exo_env.patient.patient import FIELDS
+from exo_env.plain import plain
 from exo_env.tasks.channels import Channel, Parts, Reading
 
 INFO_NAMES = (
@@ -181,6 +183,9 @@ def check_task(task: Any) -> None:
     events = task.events
     if not _words(events) or repeated(events) is not None:
         raise InputError(f"{name}: events = {events!r}; expected a tuple of different words.")
+    ahead = task.preview
+    if not isinstance(ahead, tuple | list) or not all(isinstance(x, Real) and 0.0 <= x < math.inf for x in ahead):
+        raise InputError(f"{name}: preview = {plain(ahead)!r}; expected a tuple of finite times from 0 s.")
     check_readings(name, task.readings)
     check_groups(name, task.groups, {r.name: r for r in task.readings})
     check_reported(name, task.reported, {r.name: r for r in task.readings})
@@ -215,8 +220,8 @@ def check_movement(movement: Any) -> None:
     """
     check_kernel(movement, "kernel")
     pieces = movement.pieces
-    if not isinstance(pieces, int) or pieces < FEWEST_PIECES:
+    if not isinstance(pieces, Integral) or pieces < FEWEST_PIECES:
         raise InputError(
-            f"{type(movement).__name__}: pieces = {pieces!r}; expected a whole number from {FEWEST_PIECES}. A movement "
+            f"{type(movement).__name__}: pieces = {plain(pieces)!r}; expected a whole number from {FEWEST_PIECES}. A movement "
             "of fewer repeats its last piece."
         )

@@ -14,6 +14,10 @@ failed, `read` is not called, and `event_of(w)` is SOLVER in `judge`. Kernels ta
     r, at = readings(w), first_of(w)                   the array, and where each reading begins in it
     r[at[R.angle]]                                     first component of a reading
 
+Where places belong to readings that other tasks take over, as those of elbow.py, `begins(R, declared)` of checked.py
+has a task refused that uses R and does not begin with these readings. All that a task declares is checked when it is
+made.
+
 The reward is the sum of the terms times their weights. An environment is a task, an ecosystem, drives and settings
 (envs/base_env.py); the same task serves single environments and batches.
 """

@@ -119,6 +119,12 @@ def test_events(events):
         made(events=events)
 
 
+@pytest.mark.parametrize("preview", [0.1, (-0.1,), (float("nan"),), ("soon",)])
+def test_preview(preview):
+    with pytest.raises(InputError, match="Own: preview = .*expected a tuple of finite times"):
+        made(preview=preview)
+
+
 @compiled
 def _read_by_way_of_another(w):
     """A kernel that takes readings by their places in one that it calls."""
