@@ -53,6 +53,11 @@ def _words(value: Any) -> bool:
     return isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
 
 
+def _is_time(value: Any) -> bool:
+    """Whether a value is a finite number from 0."""
+    return isinstance(value, Real) and 0.0 <= float(value) < math.inf
+
+
 def check_readings(task: str, readings: Sequence[Reading]) -> None:
     """Check each reading by itself and that their names differ.
 
@@ -184,7 +189,7 @@ def check_task(task: Any) -> None:
     if not _words(events) or repeated(events) is not None:
         raise InputError(f"{name}: events = {events!r}; expected a tuple of different words.")
     ahead = task.preview
-    if not isinstance(ahead, tuple | list) or not all(isinstance(x, Real) and 0.0 <= x < math.inf for x in ahead):
+    if not isinstance(ahead, tuple | list) or not all(_is_time(x) for x in ahead):
         raise InputError(f"{name}: preview = {plain(ahead)!r}; expected a tuple of finite times from 0 s.")
     check_readings(name, task.readings)
     check_groups(name, task.groups, {r.name: r for r in task.readings})
@@ -222,6 +227,6 @@ def check_movement(movement: Any) -> None:
     pieces = movement.pieces
     if not isinstance(pieces, Integral) or pieces < FEWEST_PIECES:
         raise InputError(
-            f"{type(movement).__name__}: pieces = {plain(pieces)!r}; expected a whole number from {FEWEST_PIECES}. A movement "
-            "of fewer repeats its last piece."
+            f"{type(movement).__name__}: pieces = {plain(pieces)!r}; expected a whole number from {FEWEST_PIECES}; a "
+            "movement that needs fewer repeats its last piece."
         )
