@@ -8,8 +8,9 @@ import pytest
 from dms_core.errors import InputError
 from exo_env.drives.checked import check_drive
 from exo_env.drives.drive import Command
-from exo_env.drives.pid_setpoint import PidSetpoint
+from exo_env.drives.pid_setpoint import SETPOINT, PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
+from exo_env.ecosystem.ecosystem import ASSISTANCE
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 
@@ -61,15 +62,13 @@ def test_shipped_drives_pass(kind):
     ("answers", "complaint"),
     [
         ({"numbers": np.zeros((1, 2))}, "numbers have shape"),
-        ({"commands": two(motor="nope")}, "command 'two': motor 'nope' is unknown; there are .*agonist"),
+        (
+            {"commands": (Command(SETPOINT, math.inf), Command(ASSISTANCE, 1.0, motor="nope"))},
+            "command 'assistance': motor 'nope' is unknown; there are .*agonist",
+        ),
     ],
 )
 def test_a_world_checks_its_drive(answers, complaint):
-    """With the PID's drive, whose ropes ask for no command of theirs."""
-    if "commands" in answers:
-        given = PidSetpoint().commands(DEVICE)
-        answers = {"commands": (given[0], Command(given[1].name, 1.0, motor="nope"))}
-        complaint = complaint.replace("'two'", f"'{given[1].name}'")
     env_type = type("OwnEnv", (ElbowLiftEnv,), {"drives": {"own": type(made(PidSetpoint, **answers))}})
     with pytest.raises(InputError, match=f"Own: .*{complaint}"):
         env_type(action_mode="own").reset(seed=0)
