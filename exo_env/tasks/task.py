@@ -209,7 +209,13 @@ def event_of(w):
 
 @compiled
 def end_with(w, code):
-    """End the episode with an event, unless another one has."""
+    """End the episode with an event, unless another one has.
+
+    Args:
+        w: the packed world.
+        code: FIRST_EVENT and the event's place in `Task.events`; any other number ends the episode too, with a
+            sentence that says so.
+    """
     status = ints(w, WORLD.status)
     if status[STATUS.event] == NOTHING:
         status[STATUS.event] = code
