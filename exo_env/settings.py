@@ -10,10 +10,15 @@ from dms_core.config_files import config_file
 from dms_core.errors import InputError
 from dms_core.validation import Checked
 from dms_core.yaml_text import read_yaml
+from exo_env.plain import plain
 
 
 class Settings(Checked):
     """Base of all settings: frozen, and checked when they are made."""
+
+    def __init__(self, **data: Any) -> None:
+        # Messages show what was given.
+        super().__init__(**plain(data))
 
     def __hash__(self) -> int:
         """Hash of the class and of all values, which may be mappings too."""

@@ -21,6 +21,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
+from dms_core.errors import InputError
+
 Acts = Literal["size", "muscle", "effort", "plan", "joint"]
 
 
@@ -70,10 +72,19 @@ def neutral_traits(model: type[BaseModel]) -> frozenset[str]:
 
 
 def range_of(model: type[BaseModel], name: str) -> tuple[float, float]:
-    """Least and greatest value of a trait."""
+    """Least and greatest value of a trait.
+
+    Raises:
+        InputError: the trait is declared without a greatest value.
+    """
     limits: dict[str, float] = {}
     for rule in model.model_fields[name].metadata:
         limits |= {k: float(getattr(rule, k)) for k in ("ge", "gt", "le") if hasattr(rule, k)}
+    if "le" not in limits:
+        raise InputError(
+            f"{model.__name__}: trait '{name}' has no greatest value; expected le=... in its declaration, since "
+            "populations are checked against its range and channels show it in that scale."
+        )
     return limits.get("ge", limits.get("gt", 0.0)), limits["le"]
 
 

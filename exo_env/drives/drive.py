@@ -25,6 +25,7 @@ from dms_core.model.element import Force
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.jit import compiled
+from exo_env.plain import plain
 from exo_env.settings import Settings
 from exo_env.tables import DRIVE, WORLD
 
@@ -102,7 +103,7 @@ def checked_action(action: object, size: int) -> np.ndarray:
     try:
         found = np.asarray(action, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"action = {action!r}: {right}.") from None
+        raise InputError(f"action = {plain(action)!r}: {right}.") from None
     if found.shape != (size,):
         raise InputError(f"action has shape {found.shape}: {right}.")
     if not np.isfinite(found).all():

@@ -80,7 +80,17 @@ class RopeTension(Drive):
         return np.array([[0.5 * most, 0.5 * most] for most in self._largest(device).values()])
 
     def forces(self, worn: WornExoskeleton, start: np.ndarray) -> list[Force]:
-        """The device with motors that follow the commands."""
+        """The device with motors that follow the commands.
+
+        Raises:
+            InputError: there are not as many commands as the device has ropes.
+        """
+        if len(start) != len(worn.device.ropes):
+            commands = ", ".join(c.name for c in self.commands(worn.device))
+            raise InputError(
+                f"{type(self).__name__}: {len(start)} commands ({commands}); expected one for each of the device's "
+                f"{len(worn.device.ropes)} ropes: {choices(worn.device.ropes)}."
+            )
         held = dict(zip(worn.device.ropes, start, strict=True))
         motors = {motor_name(rope): self._motor(rope, float(x), worn.device) for rope, x in held.items()}
         return [motors.get(f.name, f) for f in worn.forces(REFERENCE, ASSISTANCE)]

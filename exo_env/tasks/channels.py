@@ -32,7 +32,7 @@ class Parts:
     @property
     def action_labels(self) -> tuple[str, ...]:
         """Labels of the components of an action."""
-        return ORDINALS[: len(self.actions)]
+        return tuple(ORDINALS[k] if k < len(ORDINALS) else f"number {k + 1}" for k in range(len(self.actions)))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from exo_env.patient.slacking import MOST_EFFORT
 from exo_env.places import places
 from exo_env.tables import DRAW, DRIVE, EFFORT, GIVEN, PATIENT_TABLES, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading, trait_channels, trait_readings
+from exo_env.tasks.checked import begins
 from exo_env.tasks.task import first_of, readings, step_of
 
 
@@ -51,6 +52,7 @@ def elbow_readings(parts: Parts) -> list[Reading]:
 _NAMES = [reading.name for reading in elbow_readings(Parts((), (), ()))]
 ELBOW = places(_NAMES)
 """Place of each reading in the list of `elbow_readings`."""
+begins(ELBOW, elbow_readings)
 
 
 def device_channels() -> list[Channel]:

@@ -11,6 +11,7 @@ from exo_env.places import places
 from exo_env.settings import Settings
 from exo_env.tables import DRIVE, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Parts, Reading
+from exo_env.tasks.checked import begins
 from exo_env.tasks.elbow import (
     ELBOW,
     action_channel,
@@ -49,6 +50,7 @@ def lift_readings(parts: Parts) -> list[Reading]:
 
 LIFT = places(reading.name for reading in lift_readings(Parts((), (), ())))
 """Place of each reading in the list of `lift_readings`."""
+begins(LIFT, lift_readings)
 
 
 @compiled

@@ -25,8 +25,10 @@ from dms_core.kernels import floats, inner, matrix
 from exo_env.jit import compiled
 from exo_env.patient.distributions import Distribution, Draws, distribution
 from exo_env.places import places
+from exo_env.plain import given_mapping
 from exo_env.settings import Settings
 from exo_env.tables import PLAN, WORLD
+from exo_env.tasks.checked import check_movement
 
 START = "start_deg"
 """Name of the number that every movement has first: the elbow angle at the start [deg]."""
@@ -42,12 +44,11 @@ class Movement(Settings):
         """The movement with some of its distributions given.
 
         Raises:
-            InputError: it is no mapping, or a distribution is not possible.
+            InputError: it is no mapping, or a distribution is not possible; or the movement itself is wrongly declared.
         """
-        if source is None or isinstance(source, Mapping):
-            return cls(**(source or {}))
-        expected = ", ".join(cls.model_fields)
-        raise InputError(f"reference = {source!r}: expected a mapping with some of {expected}, or None.")
+        movement = cls(**given_mapping("reference", source, f"some of {', '.join(cls.model_fields)}, or None"))
+        check_movement(movement)
+        return movement
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, choices
+from exo_env.plain import given_mapping, plain
 from exo_env.streams import streams
 from exo_env.tasks.channels import Channel, Imperfection, Reading, Slice, first_places
 from exo_env.tasks.noise import IMPERFECTION
@@ -79,14 +80,16 @@ class Observer:
             names = {name for group, c in self.channels for name in (c.name, f"{group}.{c.name}")}
             for name in noise:
                 if name not in names:
-                    plain = choices({c.name for _, c in self.channels})
-                    raise InputError(f"noise: channel '{name}' is not observed; there are {plain}.")
-            given = {name: Imperfection(**dict(value)) for name, value in noise.items()}
+                    seen = choices({c.name for _, c in self.channels})
+                    raise InputError(f"noise: channel '{name}' is not observed; there are {seen}.")
+            given = {name: _imperfection(name, value) for name, value in noise.items()}
             return [
                 given.get(f"{group}.{c.name}", given.get(c.name, c.imperfection)) for group, c in self.channels
             ]  # fmt: skip
         if not isinstance(noise, bool):
-            raise InputError(f"noise = {noise!r}: expected True, False or a mapping from channels to imperfections.")
+            raise InputError(
+                f"noise = {plain(noise)!r}: expected True, False or a mapping from channels to imperfections."
+            )
         return [c.imperfection if noise else Imperfection() for _, c in self.channels]
 
     @property
@@ -100,26 +103,42 @@ class Observer:
         return np.zeros((int(self.imperfections[:, IMPERFECTION.whole].max()) + 2, self.size))
 
 
+def _imperfection(channel: str, given: Any) -> Imperfection:
+    """What a user gives for a channel.
+
+    Raises:
+        InputError: it is no mapping, or one of its numbers is not possible.
+    """
+    if isinstance(given, Imperfection):
+        return given
+    numbers = given_mapping(f"noise: {channel}", given, f"some of {choices(Imperfection.model_fields)}")
+    try:
+        return Imperfection(**numbers)
+    except InputError as error:
+        raise InputError(f"noise: {channel}: {error}") from None
+
+
 def _chosen(names: Sequence[str], groups: Mapping[str, Sequence[Channel]]) -> list[tuple[str, Channel]]:
     """(group, channel) of what is asked for, in order.
 
     Raises:
         InputError: a name is unknown, stands twice, or nothing is asked for.
     """
-    if isinstance(names, str) or not isinstance(names, Sequence) or not names or len(set(names)) < len(names):
+    words = isinstance(names, Sequence) and not isinstance(names, str) and all(isinstance(x, str) for x in names)
+    if not words or not names or len(set(names)) < len(names):
         raise InputError(
-            f"observation = {names!r}: expected a list of different groups of {choices(groups)}, or of channels as "
-            "'group.channel'."
+            f"observation = {plain(names)!r}: expected a list of different groups of {choices(groups)}, or of channels "
+            "as 'group.channel'."
         )
     found: list[tuple[str, Channel]] = []
     for name in names:
-        group, _, single = str(name).partition(".")
+        group, dot, single = name.partition(".")
         if group not in groups:
             raise InputError(f"observation: group '{group}' is unknown; there are {choices(groups)}.")
         known = {c.name: c for c in groups[group]}
-        if single and single not in known:
+        if dot and single not in known:
             raise InputError(f"observation: group '{group}' has no channel '{single}'; it has {choices(known)}.")
-        found += [(group, c) for c in ([known[single]] if single else groups[group])]
+        found += [(group, c) for c in ([known[single]] if dot else groups[group])]
     if len(set(found)) < len(found):
         raise InputError(f"observation = {list(names)!r} asks for a channel twice.")
     return found

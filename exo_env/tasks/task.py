@@ -14,6 +14,10 @@ failed, `read` is not called, and `event_of(w)` is SOLVER in `judge`. Kernels ta
     r, at = readings(w), first_of(w)                   the array, and where each reading begins in it
     r[at[R.angle]]                                     first component of a reading
 
+Where places belong to readings that other tasks take over, as those of elbow.py, `begins(R, declared)` of checked.py
+has a task refused that uses R and does not begin with these readings. All that a task declares is checked when it is
+made.
+
 The reward is the sum of the terms times their weights. An environment is a task, an ecosystem, drives and settings
 (envs/base_env.py); the same task serves single environments and batches.
 """
@@ -27,11 +31,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dms_core.errors import choices
 from dms_core.kernels import floats, inner, ints
 from exo_env.jit import compiled
+from exo_env.plain import given_mapping
 from exo_env.settings import Settings
 from exo_env.tables import STATUS, TASK, WORLD
 from exo_env.tasks.channels import Channel, Parts, Reading, Slice, first_places
+from exo_env.tasks.checked import check_task
 from exo_env.tasks.movement import Movement
 
 NOTHING, SOLVER, FIRST_EVENT = range(3)
@@ -59,6 +66,9 @@ class Task(ABC):
         parts: names of what the ecosystem and the drive have.
         weights: changes of the terms' weights.
         limits: changes of the limits.
+
+    Raises:
+        InputError: weights or limits are not possible, or what the task declares is wrong (checked.py).
     """
 
     weights_type: ClassVar[type[Settings]]
@@ -79,11 +89,13 @@ class Task(ABC):
         self, parts: Parts, weights: Mapping[str, float] | None = None, limits: Mapping[str, float] | None = None
     ) -> None:
         self.parts = parts
-        self.weights, self.limits = self.weights_type(**(weights or {})), self.limits_type(**(limits or {}))
+        self.weights = _made(self.weights_type, "reward_weights", weights)
+        self.limits = _made(self.limits_type, "limits", limits)
         self.terms = tuple(type(self.weights).model_fields)
         """Names of the reward terms."""
         self.readings = self.declared_readings(parts)
         self.groups = self.declared_groups(parts)
+        check_task(self)
         ends = first_places(self.readings).tolist()
         self.places = {r.name: slice(*ends[k : k + 2]) for k, r in enumerate(self.readings)}
         """Where the components of each reading stand in the array of all."""
@@ -113,7 +125,7 @@ class Task(ABC):
 
     def numbers(self) -> np.ndarray:
         """Numbers that the kernels read beside the readings: here those of the limits, shape (n,)."""
-        return self.limits.numbers()  # type: ignore[attr-defined]
+        return self.limits.numbers()
 
     def weight_numbers(self) -> np.ndarray:
         """Weight of each reward term, in their order, shape (n,)."""
@@ -136,7 +148,27 @@ class Task(ABC):
 
     def event(self, code: int, values: Values) -> str:
         """The sentence on an event, by the event's code."""
-        return self.sentence(self.events[code - FIRST_EVENT], values)
+        known = dict(enumerate(self.events, FIRST_EVENT))
+        if code in known:
+            return self.sentence(known[code], values)
+        return f"The kernel judge of {type(self).__name__} gave the event number {code}; {self._expected_events()}."
+
+    def solver_blamed(self) -> str:
+        """The sentence where the task gives the code of a solver that failed, and none has."""
+        return (
+            f"The kernel judge of {type(self).__name__} gave the event number {SOLVER}, SOLVER, which is set where the "
+            f"solver fails; it has not, and {self._expected_events()}."
+        )
+
+    def _expected_events(self) -> str:
+        """What `end_with` takes, for a message."""
+        known = ", ".join(f"{code} ({name})" for code, name in enumerate(self.events, FIRST_EVENT))
+        return f"end_with expects one of {known}" if known else f"{type(self).__name__} declares no events"
+
+
+def _made(kind: type[Settings], key: str, given: Any) -> Any:
+    """Settings of a kind with some values given under a key."""
+    return kind(**given_mapping(key, given, f"some of {choices(kind.model_fields)}, or None"))
 
 
 @compiled
@@ -177,7 +209,13 @@ def event_of(w):
 
 @compiled
 def end_with(w, code):
-    """End the episode with an event, unless another one has."""
+    """End the episode with an event, unless another one has.
+
+    Args:
+        w: the packed world.
+        code: FIRST_EVENT and the event's place in `Task.events`; any other number ends the episode too, with a
+            sentence that says so.
+    """
     status = ints(w, WORLD.status)
     if status[STATUS.event] == NOTHING:
         status[STATUS.event] = code

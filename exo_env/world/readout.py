@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dms_core.results import Result
 from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.patient.patient import fields_of
 from exo_env.tables import STATUS
@@ -69,6 +70,8 @@ class Readout:
             return None
         if code == SOLVER:
             dynamics = self.episode.world
+            if dynamics.result is Result.SUCCESS:
+                return self.world.task.solver_blamed()
             return f"{dynamics.result.value} Stopped at t = {dynamics.time:.6g} s."
         return self.world.task.event(code, self)
 

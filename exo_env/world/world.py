@@ -13,9 +13,10 @@ import numpy as np
 from dms_core import Model, SolverOptions, World
 from dms_core.errors import InputError, SimulationError
 from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
-from dms_core.model import MinimumJerk
+from dms_core.model import MinimumJerk, RopeActuator
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
+from exo_env.drives.checked import check_drive, check_motors
 from exo_env.drives.drive import Drive
 from exo_env.ecosystem.arm import excitation_name
 from exo_env.ecosystem.ecosystem import REFERENCE, Ecosystem
@@ -45,6 +46,7 @@ from exo_env.tables import (
     WorldTables,
 )
 from exo_env.tasks.channels import first_places
+from exo_env.tasks.checked import check_movement, check_sensors
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import Task
@@ -76,7 +78,8 @@ class PatientWorld:
         options: options of the solver.
 
     Raises:
-        InputError: the ecosystem has no gym machine, or the device does not fit the drive.
+        InputError: the ecosystem has no gym machine, the device does not fit the drive, or drive, movement or task
+            declare what cannot be (drives/checked.py, tasks/checked.py).
     """
 
     def __init__(
@@ -94,6 +97,8 @@ class PatientWorld:
     ) -> None:
         if ecosystem.machine is None:
             raise InputError("an environment needs a gym machine; this ecosystem has machine = None.")
+        check_drive(drive, ecosystem.device)
+        check_movement(movement)
         self.ecosystem, self.machine, self.drive, self.task = ecosystem, ecosystem.machine, drive, task
         self.movement, self.observer, self.options = movement, observer, options
         self.period, self.duration = period, duration
@@ -109,6 +114,9 @@ class PatientWorld:
         self.model = Model(system, like=self._scaling.template)
         self.names = {name: k for k, (name, _) in enumerate(self.model.layout.outputs)}
         """Place of each sensor's component among the model's sensors."""
+        check_sensors(type(task).__name__, task.readings, self.names)
+        motors = [f.name for f in system.forces if isinstance(f, RopeActuator)]
+        check_motors(drive, ecosystem.device, motors, self.model.layout.offset)
         self._build()
 
     def _build(self) -> None:
@@ -144,7 +152,7 @@ class PatientWorld:
         motors = [(at[c.motor], i) for i, c in enumerate(commands) if c.motor is not None]
         n = len(commands)
         return DriveTables(
-            kernel=_address(self.drive.kernel), numbers=np.ascontiguousarray(self.drive.numbers(device)),
+            kernel=_address(self.drive.kernel), numbers=np.ascontiguousarray(self.drive.numbers(device), float),
             steps=np.array([c.rate for c in commands]) * self.period, start=self.drive.start_table(device),
             motors=np.array(motors, np.int64).reshape(-1, 2),
             rows=np.array([self._row(c.name) for c in commands], np.int64),
@@ -180,7 +188,8 @@ class PatientWorld:
         source, target = np.array(copied, np.int64).reshape(-1, 2).T
         return TaskTables(
             read=_address(task.read), judge=_address(task.judge), first=first, source=source.copy(),
-            target=target.copy(), shown=np.array(shown, np.int64).reshape(-1, 2), numbers=task.numbers(),
+            target=target.copy(), shown=np.array(shown, np.int64).reshape(-1, 2),
+            numbers=np.ascontiguousarray(task.numbers(), float),
             weights=task.weight_numbers(), readings=np.zeros(int(first[-1])), terms=np.zeros(len(task.terms)),
             reward=np.zeros(1),
         )  # fmt: skip
@@ -285,5 +294,5 @@ def _address(kernel: object) -> np.ndarray:
 
 
 def _pieces(count: int) -> MinimumJerk:
-    """A signal of that many pieces, at least 3; a movement's kernel fills them."""
+    """A signal of that many pieces, at least FEWEST_PIECES; a movement's kernel fills them."""
     return MinimumJerk(times=tuple(map(float, range(count - 1))), values=(TEMPLATE_ANGLE,) * (count - 1))
