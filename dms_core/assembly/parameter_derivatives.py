@@ -34,7 +34,6 @@ from dms_core.errors import InputError, choices
 from dms_core.model.element import PARAMETER_DERIVATIVE
 from dms_core.model.system import System
 
-
 AGREEMENT = 1e-6
 """Relative difference up to which written numbers are those of a declaration: an environment's agree to 1e-9, and the
 error of a derivative is of the size of the difference."""

@@ -90,7 +90,7 @@ def test_numbers_that_were_written_in_place_count_with_their_declaration(model):
     for array, written in zip(own.numbers, other.numbers, strict=True):
         array[:] = written
     world = World(own)
-    with pytest.raises(InputError, match="'pennation_angle' moves numbers of 'biceps' that were written in place: .*sys"):
+    with pytest.raises(InputError, match="'pennation_angle' moves numbers of 'biceps' that were written in place"):
         world.parameter_blocks("biceps", "pennation_angle", at)
     found = world.parameter_blocks("biceps", "pennation_angle", at, other.system)
     np.testing.assert_array_equal(found.r2, right.r2)
