@@ -32,8 +32,8 @@ SCALED = ("max_isometric_force", "optimal_fibre_length", "tendon_slack_length")
 TIME_CONSTANTS = ("activation_time_constant", "deactivation_time_constant")
 """Numbers of all muscles that are scaled to a patient."""
 LEAST_ACROSS = 30.0
-"""Least angle between elbow axis and humerus [deg]: elbows have 80 to 90, and along the humerus the axes of a link, y up
-and z along the hinge, do not exist."""
+"""Least angle between elbow axis and humerus [deg]: elbows have 80 to 90, and with an axis along the humerus the axes
+of a link, y up and z along the hinge, do not exist."""
 
 
 class Facts(Settings):
