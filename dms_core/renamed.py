@@ -20,7 +20,15 @@ class _OldModule(ModuleType):
         self._new, self._names = new, names
 
     def __getattr__(self, name: str) -> Any:
+        if name == "__all__":
+            return self._public()
         return moved_name(self.__name__, name, self._names, self._new)
+
+    def _public(self) -> list[str]:
+        """What `from module import *` gives: names of the new module, and single ones that have gone elsewhere."""
+        new = vars(importlib.import_module(self._new))
+        names = new.get("__all__", [name for name in new if not name.startswith("_")])
+        return sorted({*names, *self._names} - {name for name, place in self._names.items() if " " in place})
 
 
 class _MovedModule(Loader):

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dms_core.errors import DmsError, InputError, choices
@@ -86,14 +87,26 @@ def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping
         return f"{who}: unknown key '{key}'.{known}"
     if kind == "missing" and where[:-1] in lengths:
         key = ".".join(str(x) for x in where[:-1])
-        return f"{who}: {key} = {value!r}: Expected {lengths[where[:-1]]} items, got {len(value)}."
+        return f"{who}: {key} = {plain(value)!r}: Expected {lengths[where[:-1]]} items, got {len(value)}."
     if kind == "missing":
         return f"{who}: '{key}' is missing."
     if isinstance(error.get("ctx", {}).get("error"), DmsError):
         # A part with checks of its own (a path point, a signal) has named key and value already.
-        return f"{who}: {key}: {error['msg'].removeprefix('Value error, ').rstrip('.')}."
+        said = f"{error['msg'].removeprefix('Value error, ').rstrip('.')}."
+        return f"{who}: {key}: {said}" if key else f"{who}: {said}"
     said = _right(kind, error.get("ctx", {}), error["msg"])
-    return f"{who}: {key} = {value!r}: {said}" if key else f"{who}: {said}"
+    return f"{who}: {key} = {plain(value)!r}: {said}" if key else f"{who}: {said}"
+
+
+def plain(value: Any) -> Any:
+    """The value with numpy's numbers and arrays as Python's, which are printed without their types."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if type(value) in (list, tuple):
+        return type(value)(plain(x) for x in value)
+    if type(value) is dict:
+        return {key: plain(x) for key, x in value.items()}
+    return value
 
 
 def _right(kind: str, context: Mapping[str, Any], message: str) -> str:

@@ -127,14 +127,6 @@ class Layout:
         v = np.concatenate([[c.rate for c in self.coordinates], np.zeros(7)])
         return q, v
 
-    def constraint_rows(self, name: str) -> slice:
-        """Rows of phi that belong to the constraint of that name."""
-        for call in self.constraints:
-            if call.element.name == name:
-                return slice(call.row, call.row + call.rows)
-        names = [c.element.name for c in self.constraints]
-        raise ModelError(f"constraint '{name}' does not exist. Declared: {choices(names)}.")
-
 
 def _placed(element: DynamicElement | Constraint | Sensor, system: System) -> tuple[Placement, ...]:
     """Placements of an element; a name in it that does not exist is an error that names the element, too."""

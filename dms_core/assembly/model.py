@@ -14,7 +14,7 @@ from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_sy
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
-from dms_core.assembly.sensing import SENSING_CODE, Partials, composition, measure, new_sensing
+from dms_core.assembly.sensing import SENSING_CODE, composition, measure, new_sensing
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
 from dms_core.compiled import side_by_side
@@ -236,15 +236,3 @@ class Model:
     def parameter_derivatives(self) -> ParameterDerivatives:
         """Derivatives of residual and sensors by declared numbers."""
         return ParameterDerivatives(self.layout, self.sensing, self.derivatives)
-
-    def sensor_partials(self, t: float, q, v, a, lam) -> Partials:  # noqa: ANN001
-        """Derivatives of all sensor components by q, v, vdot, lam, u at one state (paper eq. 6), dense.
-
-        Inputs are the declared ones at t; those by u are by their values. `World.sensor_blocks` takes a world's inputs.
-        """
-        w, n = self._sensor_work.values, self.n_q
-        w.q[:n], w.v[:n], w.a[:n], w.lam[:] = q, v, a, lam
-        evaluate_inputs(Packed(self._signals).table, t, False, self._sensor_work.table)
-        into = self.derivatives.partials()
-        by_input = into.u + self.derivatives.inputs.of_moments()[:, :, 0]
-        return Partials(into.q[:, :n], into.v[:, :n], into.a[:, :n], into.lam, by_input)

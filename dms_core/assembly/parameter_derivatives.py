@@ -6,8 +6,10 @@ the arms of all joints of that body. dpar/dp is the central difference of two de
     h = STEP |p|, or STEP where p = 0          STEP = 6e-6 (input_derivatives.py)
 
 What an element's `parameter_kernel` gives is then exact but for dpar/dp; kernels without one, all constraints and all
-sensors are differenced over the same two sets of numbers. Where the numbers of a model were written in place
-(`Model.numbers`), the differences are taken about these.
+sensors are differenced over the same two sets of numbers.
+
+Where the numbers of a model were written in place (`Model.numbers`), its own declaration is that of other numbers, and
+dpar/dp, which may depend on them, cannot be had from it: the system that declares the written numbers must be handed.
 """
 
 from __future__ import annotations
@@ -31,6 +33,10 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, choices
 from dms_core.model.element import PARAMETER_DERIVATIVE
 from dms_core.model.system import System
+
+AGREEMENT = 1e-6
+"""Relative difference up to which written numbers are those of a declaration: an environment's agree to 1e-9, and the
+error of a derivative is of the size of the difference."""
 
 
 class ParameterBlocks(NamedTuple):
@@ -127,20 +133,21 @@ class ParameterDerivatives:
         self._slopes = Packed(slopes)
         self._directions: dict[tuple[str, str], _Direction] = {}
 
-    def _direction(self, name: str, path: str) -> _Direction:
-        """What the number moves.
+    def _direction(self, name: str, path: str, declared: Layout) -> _Direction:
+        """What the number moves in a declared layout.
 
         Raises:
             InputError: there is no such number, or moving it changes more than numbers.
         """
-        if (name, path) in self._directions:
+        own = declared is self._layout
+        if own and (name, path) in self._directions:
             return self._directions[name, path]
-        system, keys = self._layout.system, path.split(".")
+        system, keys = declared.system, path.split(".")
         element = system.element(name)
         p = _number(f"{element.kind} '{name}'", element, keys)
         h = STEP * (abs(p) or 1.0)
         low, high = (Layout(_system_with(system, _moved(element, keys, x))) for x in (-h, h))
-        if not (same_structure(low, self._layout) and same_structure(high, self._layout)):
+        if not (same_structure(low, declared) and same_structure(high, declared)):
             raise InputError(f"{element.kind} '{name}': '{path}' = {p} cannot be moved alone: the structure changes.")
         halves = [
             0.5 * (_numbers(a) - _numbers(b))
@@ -149,11 +156,63 @@ class ParameterDerivatives:
                 strict=True,
             )
         ]  # fmt: skip
-        return self._directions.setdefault((name, path), _Direction(h, *halves))
+        direction = _Direction(h, *halves)
+        if own:
+            self._directions[name, path] = direction
+        return direction
 
-    def of(self, name: str, path: str, point: OperatingPoint) -> ParameterBlocks:
-        """Derivatives by the number `path` of element `name` at the point."""
-        direction, sensing, n = self._direction(name, path), self._sensing, self._layout.n_q
+    def _declared(self, system: System | None) -> Layout:
+        """Layout of a handed system, or the model's own.
+
+        Raises:
+            InputError: the system has other elements, or joins them otherwise.
+        """
+        if system is None or system is self._layout.system:
+            return self._layout
+        declared = Layout(system)
+        if not same_structure(declared, self._layout):
+            raise InputError(
+                f"system = '{system.name}' has other elements or joins than the model of '{self._layout.system.name}'; "
+                "expected a system that differs from the model's in numbers only."
+            )
+        return declared
+
+    def _check_written(self, who: str, direction: _Direction, declared: Layout) -> None:
+        """Refuse to move numbers of a kernel that are not those of the declaration.
+
+        Raises:
+            InputError: names the element whose numbers differ, and says what to hand.
+        """
+        sensing = self._sensing
+        for calls, table, moved in (
+            (declared.dynamics, sensing.dynamics.values, direction.dynamics),
+            (declared.constraints, sensing.constraints.values, direction.constraints),
+            (declared.sensors, sensing.sensors.values, direction.sensors),
+        ):
+            for e, call in enumerate(calls):
+                part = slice(table.par_ptr[e], table.par_ptr[e + 1])
+                if not moved[part].any():
+                    continue
+                here, there = table.par[part], np.asarray(call.placement.numbers, float)
+                size = AGREEMENT * (np.abs(there) + AGREEMENT * np.abs(there).max())
+                if (wrong := np.flatnonzero(~(np.abs(here - there) <= size))).size:
+                    k = int(wrong[0])
+                    raise InputError(
+                        f"{who} moves numbers of '{call.element.name}' that were written in place: the model holds "
+                        f"{here[k]:.6g} where the declaration gives {there[k]:.6g}. Hand the system that declares the "
+                        "present numbers: parameter_blocks(..., system=...)."
+                    )
+
+    def of(self, name: str, path: str, point: OperatingPoint, system: System | None = None) -> ParameterBlocks:
+        """Derivatives by the number `path` of element `name` at the point; `system` declares the present numbers.
+
+        Raises:
+            InputError: there is no such number, or the present numbers are not those of the system (default: that of
+                the model).
+        """
+        declared, sensing, n = self._declared(system), self._sensing, self._layout.n_q
+        direction = self._direction(name, path, declared)
+        self._check_written(f"{declared.system.element(name).kind} '{name}': '{path}'", direction, declared)
         w = self._derivatives.put(point)
         dynamics, ptr = sensing.dynamics.values, sensing.dynamics.values.par_ptr
         analytic, rest = np.zeros(n + 7), direction.dynamics.copy()

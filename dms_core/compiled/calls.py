@@ -3,6 +3,10 @@
 An element's kernel is an ordinary `numba.njit` function, so that it can be called, tested and cached like any other.
 The compiled loops know it only by the address of its machine code (of its entry, see entries.py): one loop, compiled
 and cached once, serves every element that exists or that a user writes later.
+
+An exception in such a function is passed on by its caller, as between numba's own functions, and reaches Python: a
+kernel that raises, or that divides by zero without error_model="numpy", ends the call of Python that led to it. What it
+was to write is then written in part, so that a world must be reset or restored before it goes on.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from functools import cache
 from typing import Any
 
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 TABLE = types.Array(types.int64, 2, "C")
@@ -34,12 +39,18 @@ def address(function: Any, signature: Any) -> int:
 
 
 def call_by_address(signature: Any) -> Any:
-    """What an intrinsic (address, *arguments) gives back: a call of the code at an address, by numba's convention."""
+    """What an intrinsic (address, *arguments) gives back: a call of the code at an address, by numba's convention.
+
+    Where the code raises, so does the caller.
+    """
 
     def codegen(context, builder, sig, args):
         target = context.call_conv.get_function_type(signature.return_type, signature.args)
         function = builder.inttoptr(args[0], target.as_pointer())
-        _, value = context.call_conv.call_function(builder, function, signature.return_type, signature.args, args[1:])
+        convention = context.call_conv
+        status, value = convention.call_function(builder, function, signature.return_type, signature.args, args[1:])
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
         return context.get_dummy_value() if signature.return_type == types.none else value
 
     return signature.return_type(types.int64, *signature.args), codegen

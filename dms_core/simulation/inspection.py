@@ -15,6 +15,7 @@ from dms_core.assembly.residual import evaluate_inputs
 from dms_core.compiled.arena import Packed, inner
 from dms_core.errors import ModelError, SimulationError
 from dms_core.linear.null_space import null_space
+from dms_core.model.system import System
 from dms_core.results import Result
 from dms_core.simulation import snapshot
 from dms_core.simulation.newton_matrix import NewtonMatrix
@@ -75,19 +76,23 @@ class Inspection:
         """Sensors (paper eq. 5) and their derivatives by q, v, vdot, lam, mu, u (eq. 6); at the present point."""
         return self.model.derivatives.sensor_blocks(self.operating_point() if point is None else point)
 
-    def parameter_blocks(self, element: str, number: str, point: OperatingPoint | None = None) -> ParameterBlocks:
+    def parameter_blocks(
+        self, element: str, number: str, point: OperatingPoint | None = None, system: System | None = None
+    ) -> ParameterBlocks:
         """Derivatives of residual and sensors by one declared number; at the present point.
 
         Args:
             element: name of a declaration.
             number: its number by keys and places, as 'mass', 'inertia.2', 'path.1.point.0', 'curves.active_shape'.
             point: where; default the present operating point.
+            system: declares the present numbers; default the model's own. Needed where other numbers were written into
+                the model, as an environment does for each patient; its elements must be the same.
 
         Raises:
-            InputError: there is no such number.
+            InputError: there is no such number, or the present numbers of what it moves are not those of the system.
         """
         at = self.operating_point() if point is None else point
-        return self.model.parameter_derivatives.of(element, number, at)
+        return self.model.parameter_derivatives.of(element, number, at, system)
 
     def newton_matrix(self, c0: float, point: OperatingPoint | None = None) -> NewtonMatrix:
         """d(r1, r2, r3, r4) / d(q, v, lam, mu) with qdot = c0 q + ..., vdot = c0 v + ..., factorised at a point.

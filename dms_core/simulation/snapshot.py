@@ -61,11 +61,18 @@ class Snapshot:
 
 def held_arrays(state: State) -> Iterator[np.ndarray]:
     """Every array of a world that its future may depend on."""
-    yield from (getattr(state.w, name) for name in GLOBAL_WORK)
-    yield from (state.signals.t, state.signals.c)
-    yield state.counts
+    return (array for _, array in _held_parts(state))
+
+
+def _held_parts(state: State) -> Iterator[tuple[str, np.ndarray]]:
+    """Name and array of each part of `held_arrays`."""
+    yield from ((f"w.{name}", getattr(state.w, name)) for name in GLOBAL_WORK)
+    yield from (("signals.t", state.signals.t), ("signals.c", state.signals.c))
+    yield "counts", state.counts
     # Whole numbers elsewhere are addresses of machine code, which belong to a process.
-    yield from (x for x in state if isinstance(x, np.ndarray) and x.dtype == np.float64)
+    for name, x in state._asdict().items():
+        if isinstance(x, np.ndarray) and x.dtype == np.float64:
+            yield name, x
 
 
 def _digest(*parts: Any) -> str:
@@ -114,6 +121,8 @@ def check(snapshot: Snapshot, model: Model, signals: Signals, options: SolverOpt
         there, here = getattr(snapshot.options, one.name), getattr(options, one.name)
         if there != here:
             raise InputError(f"{what} was taken with {one.name} = {there!r}; this world has {one.name} = {here!r}.")
+    if not isinstance(snapshot.orders, Orders):
+        raise InputError(f"{what} is damaged: expected orders of elimination, got {type(snapshot.orders).__name__}.")
 
 
 def tables_with(orders: Orders, present: Packed, model: Model) -> Packed:
@@ -125,9 +134,25 @@ def tables_with(orders: Orders, present: Packed, model: Model) -> Packed:
 
 
 def put_back(snapshot: Snapshot, tables: Packed, old_tables: Packed, world: Packed) -> Packed:
-    """The packed world with the snapshot's values; arrays stay where they are unless the orders differ."""
+    """The packed world with the snapshot's values; arrays stay where they are unless the orders differ.
+
+    Raises:
+        InputError: the snapshot is damaged; names the part. Nothing was written then.
+    """
     if tables is not old_tables:
         world = with_tables(tables.values, world.values)
-    for array, data in zip(held_arrays(world.values), snapshot.arrays, strict=True):
+    parts = list(_held_parts(world.values))
+    _check_sizes(snapshot, parts)
+    for (_, array), data in zip(parts, snapshot.arrays, strict=True):
         array[...] = np.frombuffer(data, array.dtype).reshape(array.shape)
     return world
+
+
+def _check_sizes(snapshot: Snapshot, parts: list[tuple[str, np.ndarray]]) -> None:
+    """Refuse a snapshot that lacks a part, or whose parts are of other sizes than the world's."""
+    what = f"The snapshot of system '{snapshot.system}' at t = {snapshot.time:.6g} s is damaged"
+    if len(snapshot.arrays) != len(parts):
+        raise InputError(f"{what}: expected {len(parts)} arrays, got {len(snapshot.arrays)}.")
+    for (name, array), data in zip(parts, snapshot.arrays, strict=True):
+        if len(data) != array.nbytes:
+            raise InputError(f"{what}: expected {array.nbytes} bytes of '{name}', got {len(data)}.")

@@ -26,6 +26,10 @@ DEFAULT = "elbow"
 """Name of the shipped device that is worn unless another is named."""
 TWO_ROPES = {"agonist": "flexion", "antagonist": "extension"}
 """Ropes of a device file of version 0.1, and which way each turns the elbow."""
+LEAST_ANGLE, MOST_ANGLE, ANGLE_STEP = 20, 100, 5
+"""Hinge angles of the exercise at which the leverage of a rope is checked [deg]."""
+LEAST_LEVERAGE = 0.001
+"""Least moment arm of a rope [m]; a controller divides by it, and a device of an arm's size has centimetres."""
 
 
 class Link(Settings):
@@ -104,6 +108,22 @@ class Exoskeleton(Settings):
     def _can_lift(self) -> Self:
         if all(rope.sign < 0 for rope in self.ropes.values()):
             raise ValueError(f"ropes {choices(self.ropes)} all pull into extension; expected one that flexes the elbow")
+        return self
+
+    @model_validator(mode="after")
+    def _pull_as_declared(self) -> Self:
+        """Refuse a rope that does not turn the elbow the way it claims, all through the exercise."""
+        for name, rope in self.ropes.items():
+            for angle in range(LEAST_ANGLE, MOST_ANGLE + 1, ANGLE_STEP):
+                arm = self.moment_arm(name, math.radians(angle))
+                if not rope.sign * arm >= LEAST_LEVERAGE:
+                    found = "it has no length" if math.isnan(arm) else f"its moment arm is {arm:.3g} m"
+                    limit = f"at least {LEAST_LEVERAGE}" if rope.sign > 0 else f"at most -{LEAST_LEVERAGE}"
+                    raise ValueError(
+                        f"ropes.{name}: pulls = '{rope.pulls}', but at a hinge angle of {angle} deg {found} (positive "
+                        f"where it flexes); expected {limit} m from {LEAST_ANGLE} to {MOST_ANGLE} deg. Move the ends "
+                        "upper and lower, or change pulls"
+                    )
         return self
 
     @classmethod

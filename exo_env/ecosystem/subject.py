@@ -11,6 +11,7 @@ Muscles that are no flexors are extensors. Another file may have other muscles, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -32,6 +33,9 @@ SCALED = ("max_isometric_force", "optimal_fibre_length", "tendon_slack_length")
 """Numbers of a muscle that are scaled to a person."""
 TIME_CONSTANTS = ("activation_time_constant", "deactivation_time_constant")
 """Numbers of all muscles that are scaled to a patient."""
+LEAST_ACROSS = 30.0
+"""Least angle between elbow axis and humerus [deg]: elbows have 80 to 90, and with an axis along the humerus the axes
+of a link, y up and z along the hinge, do not exist."""
 
 
 class Facts(Settings):
@@ -101,8 +105,7 @@ class SubjectFacts(Facts):
                 _check_role(role, getattr(self.roles, role), known, section)
         for name in self.roles.flexors:
             _check_role("flexors", name, self.muscles, "muscles")
-        if self.joints[self.roles.elbow].axis_i is None:
-            raise ValueError(f"joints.{self.roles.elbow}: 'axis_i' is missing")
+        _check_elbow_axis(self.roles.elbow, self.joints[self.roles.elbow].axis_i)
         for key in TIME_CONSTANTS:
             if key not in self.muscle_defaults:
                 raise ValueError(f"muscle_defaults: '{key}' is missing")
@@ -121,6 +124,20 @@ def _check_role(role: str, name: str, known: Mapping[str, Any], section: str) ->
     """Refuse a role that nothing in the file has."""
     if name not in known:
         raise ValueError(f"roles: {role} = {name!r}; expected one of the {section} {choices(known)}")
+
+
+def _check_elbow_axis(joint: str, axis: Vector | None) -> None:
+    """Refuse an elbow axis that is missing, has no direction or runs along the humerus, whose long axis is y."""
+    if axis is None:
+        raise ValueError(f"joints.{joint}: 'axis_i' is missing")
+    length = math.hypot(*axis)
+    across = math.degrees(math.atan2(math.hypot(axis[0], axis[2]), abs(axis[1])))
+    if across < LEAST_ACROSS:
+        what = f"is {across:.3g} deg from the humerus (y)" if length > 0.0 else "has no direction"
+        raise ValueError(
+            f"joints.{joint}: axis_i = {axis} {what}; expected an axis across the humerus, at least {LEAST_ACROSS:g} "
+            "deg from y"
+        )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from dms_core.model import (
     Fixed,
@@ -22,13 +22,15 @@ from dms_core.model import (
     Slider,
 )
 from dms_core.model.element import Constraint, Force, Vector
-from dms_core.model.geometry.frames import quaternion, quaternion_product, rotation_matrix
+from dms_core.model.geometry.frames import euler_parameters, quaternion, quaternion_product, rotation_matrix
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.settings import Settings
 
 UPPER, LOWER, HINGE, GUIDE, PID = "upper_link", "lower_link", "exo_hinge", "guide", "pid"
 GuideKind = Literal["plane", "line", "slider"]
+MOST_SHIFT, MOST_TILT = 0.1, 30.0
+"""Largest component of a shift [m] and largest tilt [deg]: beyond, a device is not worn askew but off the arm."""
 
 
 class Misalignment(Settings):
@@ -36,6 +38,20 @@ class Misalignment(Settings):
 
     shift: Vector = Field(default=(0.0, 0.0, 0.0), description="of the hinge from the elbow centre [m]")
     tilt_deg: tuple[float, float] = Field(default=(0.0, 0.0), description="of the hinge axis about x, then y [deg]")
+
+    @field_validator("shift")
+    @classmethod
+    def _on_the_arm(cls, shift: Vector) -> Vector:
+        if max(map(abs, shift)) > MOST_SHIFT:
+            raise ValueError(f"expected each component from -{MOST_SHIFT} to {MOST_SHIFT} m")
+        return shift
+
+    @field_validator("tilt_deg")
+    @classmethod
+    def _across_the_arm(cls, tilt: tuple[float, float]) -> tuple[float, float]:
+        if max(map(abs, tilt)) > MOST_TILT:
+            raise ValueError(f"expected both tilts from -{MOST_TILT:g} to {MOST_TILT:g} deg")
+        return tilt
 
 
 def motor_name(rope: str) -> str:
@@ -49,13 +65,6 @@ def link_axes(arm: Arm) -> np.ndarray:
     y = np.array([0.0, 1.0, 0.0]) - z[1] * z
     y /= np.linalg.norm(y)
     return np.column_stack([np.cross(y, z), y, z])
-
-
-def _orientation(axes: np.ndarray) -> np.ndarray:
-    """Euler parameters of a rotation matrix near the identity."""
-    p0 = 0.5 * np.sqrt(1.0 + np.trace(axes))
-    e = np.array([axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]]) / (4.0 * p0)
-    return np.concatenate([[p0], e])
 
 
 class WornExoskeleton:
@@ -78,7 +87,7 @@ class WornExoskeleton:
         self.axes = axes
         self.shift = axes @ np.array(misalignment.shift)
         """Vector from the elbow centre to the hinge, in ground axes [m]."""
-        self.orientation = quaternion_product(_orientation(axes), tilt)
+        self.orientation = quaternion_product(euler_parameters(axes), tilt)
         self.origin = arm.elbow + self.shift
 
     @property
@@ -91,9 +100,19 @@ class WornExoskeleton:
         """Point of the forearm's long axis that the guide leads, in the forearm's frame [m]."""
         return self.axes @ (0.0, -self.device.guide_distance, 0.0)
 
+    def hinge_angle(self, flexion: float) -> float:
+        """Hinge angle at which the guide is closed where the elbow is at `flexion` [rad]; the same in a device aligned.
+
+        The guided point of the forearm lies in the plane that the hinge axis and the y axis of the lower link span.
+        """
+        if self.aligned:
+            return flexion
+        x, y, _ = self.frame.T @ (self.arm.rotation(flexion) @ self.guided_point - self.shift)
+        return math.atan2(x, -y)
+
     def bodies(self, flexion: float) -> list[RigidBody]:
-        """Both links with the hinge at `flexion` [rad], at rest."""
-        turned = quaternion_product(self.orientation, quaternion((0, 0, 1), flexion))
+        """Both links where the elbow is at `flexion` [rad], at rest."""
+        turned = quaternion_product(self.orientation, quaternion((0, 0, 1), self.hinge_angle(flexion)))
         return [
             RigidBody(name=name, **dict(link), position=tuple(self.origin), orientation=tuple(p))
             for name, link, p in (

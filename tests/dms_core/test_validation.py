@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal
 
+import numpy as np
 import pytest
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from dms_core.errors import InputError, ModelError
 from dms_core.validation import Checked
@@ -14,6 +15,16 @@ from dms_core.validation import Checked
 
 class _Part(Checked):
     size: float = 1.0
+
+
+class _Whole(Checked):
+    """Refused as a whole by a check of our own, as settings that ask other settings are."""
+
+    part: float = 0.0
+
+    @model_validator(mode="after")
+    def _refused(self):
+        raise InputError("expected something else.")
 
 
 class _Thing(Checked):
@@ -44,6 +55,9 @@ class _Thing(Checked):
         ({"share": -0.5}, "thing 'box': share = -0.5: Expected a number of at least 0."),
         ({"share": 1.0}, "thing 'box': share = 1.0: Expected a number below 1."),
         ({"number": "heavy"}, "thing 'box': number = 'heavy': Expected a number."),
+        ({"number": np.float64(-1.0)}, "thing 'box': number = -1.0: Expected a number above 0."),
+        ({"path": [np.float64(1.0)]}, "thing 'box': path = [1.0]: Expected at least 2 items, got 1."),
+        ({"point": np.array([1.0, 2.0])}, "thing 'box': point = [1.0, 2.0]: Expected 3 items, got 2."),
         ({"number": None}, "thing 'box': number = None: Expected a number."),
         ({"number": math.nan}, "thing 'box': number = nan: Expected a finite number."),
         ({"count": 1.5}, "thing 'box': count = 1.5: Expected a whole number."),
@@ -82,3 +96,9 @@ def test_a_class_chooses_its_error():
 
     with pytest.raises(ModelError, match="number = 0"):
         Part(number=0)
+
+
+def test_a_mistake_without_a_key_is_said_without_one():
+    with pytest.raises(InputError) as caught:
+        _Whole()
+    assert str(caught.value) == "_Whole: expected something else."

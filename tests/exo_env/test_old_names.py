@@ -50,6 +50,17 @@ def test_what_a_users_project_wrote_in_version_0_1():
         from exo_env.human import MUSCLES  # noqa: F401
 
 
+@pytest.mark.filterwarnings("ignore:'exo_env.human:FutureWarning")
+def test_a_star_gives_the_names_that_have_moved():
+    found = {}
+    with pytest.warns(FutureWarning, match="'exo_env.human.Person' is now 'exo_env.ecosystem.person.Person'"):
+        exec("from exo_env.human import *", found)
+    assert found["Arm"] is import_module("exo_env.ecosystem.arm").Arm
+    assert found["Person"] is import_module("exo_env.ecosystem.person").Person
+    # What is gone has nothing to give; by its name it says what replaces it.
+    assert "MUSCLES" not in found
+
+
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_a_name_that_never_was_is_an_ordinary_error(folder):
     with pytest.raises(AttributeError, match="has no attribute 'horse'"):

@@ -33,6 +33,25 @@ def rotation_matrix(p) -> np.ndarray:
     return (p0 * p0 - e @ e) * np.eye(3) + 2.0 * np.outer(e, e) + 2.0 * p0 * skew
 
 
+def euler_parameters(A) -> np.ndarray:
+    """Euler parameters (scalar first) of a rotation matrix, shape (3, 3); inverse of `rotation_matrix` but for a sign.
+
+    With t = tr A, p0^2 = (1 + t) / 4 and e_k^2 = (1 + 2 A_kk - t) / 4; the largest is taken as a root, and the others
+    follow from A_ij - A_ji = 4 p0 e_k and A_ij + A_ji = 4 e_i e_j, so that nothing is divided by a small number
+    (Shepperd 1978, J. Guidance and Control 1(3):223-224).
+    """
+    A = np.asarray(A, float)
+    odd = np.array([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
+    trace, k = np.trace(A), int(np.argmax(np.diag(A)))
+    if trace >= A[k, k]:
+        p0 = 0.5 * np.sqrt(1.0 + trace)
+        return np.concatenate([[p0], odd / (4.0 * p0)])
+    e_k = 0.5 * np.sqrt(1.0 + 2.0 * A[k, k] - trace)
+    e = (A[k] + A[:, k]) / (4.0 * e_k)
+    e[k] = e_k
+    return np.concatenate([[odd[k] / (4.0 * e_k)], e])
+
+
 def quaternion(axis, angle: float) -> np.ndarray:
     """Euler parameters of a rotation by `angle` [rad] about `axis`."""
     a = unit(axis, "rotation axis")

@@ -35,8 +35,8 @@ UNITS = {
     "active_force": "N",
     "passive_force": "N",
 }
-LENGTH, RATE, FIBRE_LENGTH, FIBRE_VELOCITY, ACTIVATION, PENNATION, TENDON_FORCE, ACTIVE_FORCE, PASSIVE_FORCE = range(9)
-"""Codes of the components, in the order of UNITS."""
+LENGTH, RATE, _, FIBRE_VELOCITY, ACTIVATION, PENNATION, TENDON_FORCE, ACTIVE_FORCE, PASSIVE_FORCE = range(9)
+"""Codes of the components, in the order of UNITS; none of the others is left for the length of the fibre."""
 
 Component = Literal[
     "length",

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.assembly.layout import Layout
 from dms_core.assembly.model import Model
 from dms_core.model import (
     AngleDriver,
@@ -172,3 +173,8 @@ def random_point(model: Model, seed: int) -> Point:
     v[model.layout.index["biceps.fibre_length"]] = -0.1 * by_v[model.layout.index["biceps.fibre_length"]]
     q[model.layout.index["biceps.activation"]] = 0.4
     return Point(q, v, a, 10.0 * rng.uniform(-1.0, 1.0, model.n_phi))
+
+
+def constraint_rows(layout: Layout, name: str) -> slice:
+    """Rows of phi that belong to the constraint of that name."""
+    return next(slice(c.row, c.row + c.rows) for c in layout.constraints if c.element.name == name)

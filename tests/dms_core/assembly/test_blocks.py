@@ -29,7 +29,7 @@ from dms_core.model import (
 from dms_core.model.element import Force, Placement
 from dms_core.model.forces import LumpedLoad
 from dms_core.simulation.dynamics import World
-from tests.dms_core.assembly.specimen import random_point, scales, specimen
+from tests.dms_core.assembly.specimen import constraint_rows, random_point, scales, specimen
 from tests.dms_core.test_derivatives import differences
 
 SENSORS = (
@@ -226,7 +226,7 @@ def test_a_driven_angle_by_its_input():
         inputs=[Input(name="angle", signal=Harmonic(amplitude=0.3, frequency=1.0))],
     )  # fmt: skip
     world = World(system)
-    row = world.model.layout.constraint_rows("drive").start
+    row = constraint_rows(world.model.layout, "drive").start
     b = world.blocks()
     assert b.r3_u[row, 0].tolist() == [-1.0, 0.0, 0.0]
     assert b.r4_u[row, 0].tolist() == [0.0, -1.0, 0.0]

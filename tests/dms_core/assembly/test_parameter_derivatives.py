@@ -74,16 +74,35 @@ def test_differences_of_two_models(model, name, number, value, change, differenc
     assert some, "nothing depends on the number: the test would pass with zeros"
 
 
-def test_numbers_that_were_written_in_place_count(model):
-    own = Model(System("specimen", bodies=BODIES, constraints=CONSTRAINTS, forces=FORCES, inputs=INPUTS), like=model)
-    world, at = World(own), _point(own)
-    before = world.parameter_blocks("filter", "damping", at).r2
-    k = own.layout.index["filter.setpoint"]
-    call = next(e for e, c in enumerate(own.layout.dynamics) if c.element.name == "filter")
-    own.numbers[0][own.sensing.values.dynamics.values.par_ptr[call]] *= (
-        2.0  # the frequency, which multiplies the damping
-    )
-    assert world.parameter_blocks("filter", "damping", at).r2[k] == pytest.approx(2.0 * before[k], rel=1e-9)
+def _specimen_with(*changed) -> System:
+    """The specimen without sensors, with some forces replaced."""
+    replaced = {x.name: x for x in changed}
+    forces = [replaced.get(x.name, x) for x in FORCES]
+    return System("specimen", bodies=BODIES, constraints=CONSTRAINTS, forces=forces, inputs=INPUTS)
+
+
+def test_numbers_that_were_written_in_place_count_with_their_declaration(model):
+    own = Model(_specimen_with(), like=model)
+    pennate = own.system.element("biceps").model_copy(update={"pennation_angle": 0.3, "max_isometric_force": 900.0})
+    other = Model(_specimen_with(pennate), like=model)
+    at = _point(own)
+    right = World(other).parameter_blocks("biceps", "pennation_angle", at)
+    for array, written in zip(own.numbers, other.numbers, strict=True):
+        array[:] = written
+    world = World(own)
+    with pytest.raises(InputError, match="'pennation_angle' moves numbers of 'biceps' that were written in place"):
+        world.parameter_blocks("biceps", "pennation_angle", at)
+    found = world.parameter_blocks("biceps", "pennation_angle", at, other.system)
+    np.testing.assert_array_equal(found.r2, right.r2)
+    assert np.any(found.r2)
+    # What does not touch the written numbers needs no declaration.
+    assert np.any(world.parameter_blocks("filter", "damping", at).r2)
+
+
+def test_a_declaration_of_other_elements_is_refused(model):
+    other = System("shorter", bodies=BODIES, constraints=CONSTRAINTS, inputs=INPUTS)
+    with pytest.raises(InputError, match="system = 'shorter' has other elements or joins than the model of 'specimen'"):
+        World(model).parameter_blocks("lower", "mass", system=other)
 
 
 @pytest.mark.parametrize(

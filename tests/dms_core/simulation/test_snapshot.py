@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
 import numpy as np
@@ -226,3 +226,25 @@ def test_every_array_of_a_world_is_held_or_local(hanging):
     left_out = {name for name, x in zip(state._fields, state, strict=True) if id(x) not in held}
     # `parts` are addresses of machine code, the same for all worlds of a process.
     assert left_out <= {"w", "signals", "parts"}
+
+
+@pytest.mark.parametrize(
+    ("damaged", "complaint"),
+    [
+        (lambda s: replace(s, arrays=s.arrays[:-1]), r"at t = 0.1 s is damaged: expected \d+ arrays, got \d+"),
+        (
+            lambda s: replace(s, arrays=(*s.arrays[:1], s.arrays[1][:8], *s.arrays[2:])),
+            r"damaged: expected \d+ bytes of 'w.v', got 8",
+        ),
+        (lambda s: replace(s, orders=None), "damaged: expected orders of elimination, got NoneType"),
+    ],
+)
+def test_a_damaged_snapshot_is_refused_before_anything_is_written(hanging, damaged, complaint):
+    world = _world(hanging, "bdf2")
+    world.advance(0.1)
+    past = world.snapshot()
+    world.advance(0.2)
+    before = [x.tobytes() for x in held_arrays(world.state)]
+    with pytest.raises(InputError, match=complaint):
+        world.restore(damaged(past))
+    assert [x.tobytes() for x in held_arrays(world.state)] == before

@@ -31,6 +31,12 @@ def test_the_shipped_file_is_read_as_it_is():
         (("bodies", "r_humerus", "mass"), None, "bodies.r_humerus: BodyFacts: 'mass' is missing"),
         (("bodies", "r_humerus", "mass"), -1.0, "bodies.r_humerus: BodyFacts: mass = -1.0"),
         (("joints", "r_elbow", "axis_i"), None, "joints.r_elbow: 'axis_i' is missing"),
+        (
+            ("joints", "r_elbow", "axis_i"),
+            [0.1, -1.0, 0.0],
+            "joints.r_elbow: axis_i = (0.1, -1.0, 0.0) is 5.71 deg from the humerus (y); expected an axis across",
+        ),
+        (("joints", "r_elbow", "axis_i"), [0.0, 0.0, 0.0], "joints.r_elbow: axis_i = (0.0, 0.0, 0.0) has no direction"),
         (("joints", "r_elbow", "point_i"), "here", "joints.r_elbow: JointFacts: point_i = 'here'"),
         (("muscles",), {}, "muscles = {}"),
         (("muscles", "BRA", "optimal_fibre_length"), None, "muscles.BRA: 'optimal_fibre_length' is missing"),
