@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -32,11 +32,16 @@ LEAST_LEVERAGE = 0.001
 """Least moment arm of a rope [m]; a controller divides by it, and a device of an arm's size has centimetres."""
 
 
+Metres = Annotated[float, Field(ge=-1.0, le=1.0)]
+"""A coordinate of a point of a device [m]; beyond a metre it is in another unit."""
+Point = tuple[Metres, Metres, Metres]
+
+
 class Link(Settings):
     """Inertia of a link in its own frame."""
 
-    mass: float = Field(gt=0.0, description="mass [kg]")
-    centre_of_mass: Vector = Field(description="[m]")
+    mass: float = Field(gt=0.0, le=20.0, description="mass [kg]")
+    centre_of_mass: Point = Field(description="[m]")
     inertia: Vector = Field(description="principal moments about the centre of mass [kg m^2]")
 
     def numbers(self) -> np.ndarray:
@@ -47,8 +52,8 @@ class Link(Settings):
 class Rope(Settings):
     """Both ends of a rope, and which way it turns the elbow."""
 
-    upper: Vector = Field(description="on the upper link [m]")
-    lower: Vector = Field(description="on the lower link [m]")
+    upper: Point = Field(description="on the upper link [m]")
+    lower: Point = Field(description="on the lower link [m]")
     pulls: Literal["flexion", "extension"] = Field(description="direction in which its tension turns the elbow")
 
     @property
@@ -60,7 +65,7 @@ class Rope(Settings):
 class Actuator(Settings):
     """Motor of a rope."""
 
-    time_constant: float = Field(gt=0.0, description="first-order lag of the tension [s]")
+    time_constant: float = Field(gt=0.0, le=0.5, description="first-order lag of the tension [s]")
     max_tension: float = Field(gt=0.0, description="largest tension [N]")
     pretension: float = Field(ge=0.0, description="tension without a command [N]")
     width: float = Field(gt=0.0, description="width of the smoothed positive part [N]")
@@ -88,7 +93,7 @@ class Exoskeleton(Settings):
     lower_link: Link
     hinge_damping: float = Field(ge=0.0, description="viscous friction [N m s/rad]")
     ropes: dict[str, Rope] = Field(min_length=1, description="ropes by name, each with a motor of its own")
-    guide_distance: float = Field(gt=0.0, description="from the hinge to the guided point of the forearm [m]")
+    guide_distance: float = Field(gt=0.0, le=0.6, description="from the hinge to the guided point of the forearm [m]")
     actuator: Actuator
     tuning: CriticalOscillation
     gains: PidGains

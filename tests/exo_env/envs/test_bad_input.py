@@ -187,3 +187,18 @@ def test_seeds_of_a_batch(seed, complaint):
             worlds.reset(seed=seed)
     finally:
         worlds.close()
+
+
+@pytest.mark.parametrize(
+    ("device", "complaint"),
+    [
+        ({"ropes": {"agonist": {"lower": [33.8, -72.5, 50.0]}}}, r"lower\S* = 33.8.*at most 1"),
+        ({"guide_distance": 16.0}, "guide_distance = 16.0.*at most 0.6"),
+        ({"lower_link": {"mass": 450.0}}, "mass = 450.0.*at most 20"),
+        ({"lower_link": {"centre_of_mass": [0.0, -100.0, 50.0]}}, r"centre_of_mass\S* = -100.0.*from -1|at least -1"),
+        ({"actuator": {"time_constant": 1.0}}, "time_constant = 1.0.*at most 0.5"),
+    ],
+)
+def test_numbers_of_a_device_in_another_unit_are_refused(device, complaint):
+    with pytest.raises(InputError, match=complaint):
+        ElbowLiftEnv(exoskeleton=device)
