@@ -8,17 +8,12 @@ from typing import Any, Self
 
 from dms_core.config_files import config_file
 from dms_core.errors import InputError
-from dms_core.validation import Checked
+from dms_core.validation import Checked, plain
 from dms_core.yaml_text import read_yaml
-from exo_env.plain import plain
 
 
 class Settings(Checked):
     """Base of all settings: frozen, and checked when they are made."""
-
-    def __init__(self, **data: Any) -> None:
-        # Messages show what was given.
-        super().__init__(**plain(data))
 
     def __hash__(self) -> int:
         """Hash of the class and of all values, which may be mappings too."""
@@ -65,3 +60,21 @@ def _merged(now: Any, change: Any) -> Any:
     if isinstance(now, Mapping) and now and all(isinstance(x, Settings) for x in now.values()):
         return {**now, **{name: _merged(now.get(name), x) for name, x in change.items()}}
     return change
+
+
+def given_mapping(key: str, value: Any, expected: str) -> dict[str, Any]:
+    """A mapping that a user gave, with plain numbers; None is an empty one.
+
+    Args:
+        key: name of the setting.
+        value: what was given.
+        expected: words for what the mapping holds.
+
+    Raises:
+        InputError: it is no mapping, or a key is no word.
+    """
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise InputError(f"{key} = {plain(value)!r}: expected a mapping with {expected}.")
+    return plain(value)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import plain
 from exo_env.drives.drive import Command, Drive, affine
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.kernel_checks import check_kernel, uses
-from exo_env.plain import plain
 
 
 def check_drive(drive: Drive, device: Exoskeleton) -> None:

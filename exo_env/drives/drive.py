@@ -22,10 +22,10 @@ from dms_core.errors import InputError
 from dms_core.kernels import floats, inner, matrix
 from dms_core.model import Constant, Input
 from dms_core.model.element import Force
+from dms_core.validation import plain
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.jit import compiled
-from exo_env.plain import plain
 from exo_env.settings import Settings
 from exo_env.tables import DRIVE, WORLD
 

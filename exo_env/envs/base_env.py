@@ -32,6 +32,7 @@ from dms_core.errors import InputError, SimulationError, choices
 from dms_core.kernels import DONE, MATRIX_SINGULAR, Packed
 from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
+from exo_env.drives.checked import check_drive
 from exo_env.drives.drive import Drive, checked_action
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
@@ -93,6 +94,7 @@ class AssistanceEnv(gymnasium.Env):
         self.steps = control_steps(self.duration, s.control_rate)
         self.ecosystem = self.made_ecosystem(s)
         self.action_mode, self.drive = s.action_mode, self._made_drive(s)
+        check_drive(self.drive, self.ecosystem.device)
         actions = self.drive.actions(self.ecosystem.device)
         self.task = self.task_type(
             Parts(self.ecosystem.arm().muscles, tuple(self.ecosystem.device.ropes), actions), s.reward_weights, s.limits

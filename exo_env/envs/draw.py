@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import plain
 from exo_env.envs.settings import load_distribution, within
 from exo_env.patient.distributions import Distribution, Draws
 from exo_env.patient.population import Population, population
@@ -134,7 +135,7 @@ class EpisodeDraws:
         """An angle at which an episode may begin [deg]."""
         low, high = self.start_range
         if not within(angle, low, high):
-            raise InputError(f"initial_angle_deg = {angle!r}: expected a number from {low:g} to {high:g}.")
+            raise InputError(f"initial_angle_deg = {plain(angle)!r}: expected a number from {low:g} to {high:g}.")
         return float(angle)
 
     def _checked(self, sources: Sources) -> Sources:

@@ -12,9 +12,9 @@ from numbers import Integral, Real
 from typing import Any
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import plain
 from exo_env.kernel_checks import check_kernel, uses
 from exo_env.patient.patient import FIELDS
-from exo_env.plain import plain
 from exo_env.tasks.channels import Channel, Parts, Reading
 
 INFO_NAMES = (

@@ -25,8 +25,7 @@ from dms_core.kernels import floats, inner, matrix
 from exo_env.jit import compiled
 from exo_env.patient.distributions import Distribution, Draws, distribution
 from exo_env.places import places
-from exo_env.plain import given_mapping
-from exo_env.settings import Settings
+from exo_env.settings import Settings, given_mapping
 from exo_env.tables import PLAN, WORLD
 from exo_env.tasks.checked import check_movement
 

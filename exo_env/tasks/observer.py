@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, choices
-from exo_env.plain import given_mapping, plain
+from dms_core.validation import plain
+from exo_env.settings import given_mapping
 from exo_env.streams import streams
 from exo_env.tasks.channels import Channel, Imperfection, Reading, Slice, first_places
 from exo_env.tasks.noise import IMPERFECTION

@@ -16,7 +16,7 @@ from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
 from dms_core.model import MinimumJerk, RopeActuator
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
-from exo_env.drives.checked import check_drive, check_motors
+from exo_env.drives.checked import check_motors
 from exo_env.drives.drive import Drive
 from exo_env.ecosystem.arm import excitation_name
 from exo_env.ecosystem.ecosystem import REFERENCE, Ecosystem
@@ -97,7 +97,6 @@ class PatientWorld:
     ) -> None:
         if ecosystem.machine is None:
             raise InputError("an environment needs a gym machine; this ecosystem has machine = None.")
-        check_drive(drive, ecosystem.device)
         check_movement(movement)
         self.ecosystem, self.machine, self.drive, self.task = ecosystem, ecosystem.machine, drive, task
         self.movement, self.observer, self.options = movement, observer, options
