@@ -51,9 +51,9 @@ class Plan:
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Further settings of the environment."""
     id: str = field(init=False)
-    """Under which the environment is registered."""
+    """Id under which the environment is registered."""
     title: str = field(init=False)
-    """Of the population."""
+    """Title of the population."""
     patient: dict[str, Any] = field(init=False)
     """Fields of the population, which other processes can be given."""
 

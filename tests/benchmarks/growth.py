@@ -37,7 +37,7 @@ from tests.benchmarks.env_speed import actions_of
 from tests.benchmarks.problems import ARM_TASKS, START_ACTIVATION, chain
 
 STEP, WARM = 1e-3, 0.02
-"""Of the chain and the arm [s], and what is solved before the clock starts."""
+"""Step of the chain and the arm [s], and what is solved before the clock starts."""
 STEEPEST, FLAT, WARM_ROWS = 1.1, 16, 5
 """Slope allowed; number of different patients; control periods before the clock starts."""
 MODE = "pid_setpoint"

@@ -17,7 +17,7 @@ PLANNED, FULL = np.maximum(8.0 * np.sin(TIMES), 0.0), np.maximum(30.0 * np.sin(T
 
 
 def work(error, patient=PATIENT):
-    """Of a patient whose moments are in proportion to what is intended [J]."""
+    """Work of a patient whose moments are in proportion to what is intended [J]."""
     effort, found = patient.effort_at_start, 0.0
     for e, p, g in zip(error, PLANNED, FULL, strict=True):
         effort = advance_effort(effort, e, patient.slacking_rate, patient.effort_recovery, patient.least_effort, PERIOD)

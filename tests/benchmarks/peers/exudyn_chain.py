@@ -47,7 +47,7 @@ def chain(links: int) -> tuple[Any, list[Any]]:
 
 
 def settings(step: float, seconds: float, linear: str = "EigenSparse") -> exu.SimulationSettings:
-    """Of a run at a fixed step [s]."""
+    """Settings of a run at a fixed step [s]."""
     found = exu.SimulationSettings()
     found.timeIntegration.numberOfSteps = round(seconds / step)
     found.timeIntegration.endTime = seconds

@@ -35,7 +35,7 @@ def test_setpoint_goes_through_the_filter():
     w, errors = 20.0, []
 
     def integral(t):
-        """Of the filter's answer to a unit step, 1 - (1 + w t) exp(-w t)."""
+        """Integral of the filter's answer to a unit step, 1 - (1 + w t) exp(-w t)."""
         return t - (2.0 - (2.0 + w * t) * math.exp(-w * t)) / w
 
     for k in range(1, 31):

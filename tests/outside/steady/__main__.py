@@ -48,7 +48,7 @@ def run(name: str) -> dict:
 
 
 def info_of(env: gymnasium.Env) -> dict:
-    """Of a new episode."""
+    """The info of a new episode."""
     return env.reset(seed=4)[1]
 
 

@@ -26,7 +26,7 @@ from exo_env.tasks.task import Reported, Task
 
 
 class Weights(Settings):
-    """Of the two terms."""
+    """Weights of the two terms."""
 
     stillness: float = Field(default=1.0, ge=0.0)
     quiet: float = Field(default=0.1, ge=0.0)

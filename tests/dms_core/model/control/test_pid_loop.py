@@ -26,7 +26,7 @@ MASS, LENGTH, INERTIA, GRAVITY = 1.5, 0.15, 0.02, 9.80665
 KP, KI, KD = 300.0, 200.0, 15.0
 LAG, PRETENSION, WIDTH = 0.01, 3.0, 4.0
 ANCHOR, LEVER = np.array([0.15, 0.1]), np.array([0.03, -0.1])
-"""Of the agonist, on the ground and on the arm [m]; the antagonist mirrors both."""
+"""Ends of the agonist, on the ground and on the arm [m]; the antagonist mirrors both."""
 TIMES, ANGLES = (0.1, 0.6, 0.9, 1.4), (0.0, 0.8, 0.8, 0.2)
 END = 1.8
 GRID = np.linspace(0.0, END, 91)
