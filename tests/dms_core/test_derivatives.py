@@ -32,8 +32,8 @@ STEP = 3e-5
 derivative, rounding by 1e-16 / STEP = 3e-12 times the value."""
 
 RTOL = 1e-7
-"""Share of the largest derivative by the same coordinate. Curved elements need the room (the fifth derivative of a tendon
-curve by length is about 1e10 times its slope); a forgotten term of any importance is larger."""
+"""Share of the largest derivative by the same coordinate. Curved elements need the room (the fifth derivative of a
+tendon curve by length is about 1e10 times its slope); a forgotten term of any importance is larger."""
 
 ATOL = 3e-10
 """Share of the largest value, over the scale of the coordinate: hundredfold the rounding error above."""
