@@ -32,6 +32,7 @@ from dms_core.errors import InputError, SimulationError, choices
 from dms_core.kernels import DONE, MATRIX_SINGULAR, Packed
 from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
+from dms_core.validation import plain
 from exo_env.drives.checked import check_drive
 from exo_env.drives.drive import Drive, checked_action
 from exo_env.drives.pid_setpoint import PidSetpoint
@@ -83,7 +84,7 @@ class AssistanceEnv(gymnasium.Env):
 
     def __init__(self, **settings: Any) -> None:
         # What a caller does to a mapping afterwards must not reach into the environment.
-        self.settings = s = checked_settings(self.settings_type, copy.deepcopy(settings))
+        self.settings = s = checked_settings(self.settings_type, plain(copy.deepcopy(settings)))
         if s.render_mode is not None:
             from exo_env.rendering.canvas import import_pygame
 
@@ -209,7 +210,7 @@ class AssistanceEnv(gymnasium.Env):
         Raises:
             InputError: an option is unknown or not usable.
         """
-        super().reset(seed=seed)
+        super().reset(seed=plain(seed))
         self._over, self._episode = True, None
         if seed is not None:
             self._keys.restart()

@@ -120,7 +120,8 @@ class EpisodeDraws:
             InputError: an option is unknown or not usable.
         """
         made: dict[str, Any] = {}
-        for name, value in checked_options(options).items():
+        for name, given in checked_options(options).items():
+            value = plain(given)
             if name == "patient":
                 made["patients"] = population(value)
             elif name == "load":
@@ -135,7 +136,7 @@ class EpisodeDraws:
         """An angle at which an episode may begin [deg]."""
         low, high = self.start_range
         if not within(angle, low, high):
-            raise InputError(f"initial_angle_deg = {plain(angle)!r}: expected a number from {low:g} to {high:g}.")
+            raise InputError(f"initial_angle_deg = {angle!r}: expected a number from {low:g} to {high:g}.")
         return float(angle)
 
     def _checked(self, sources: Sources) -> Sources:

@@ -12,7 +12,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from dms_core.errors import InputError, SimulationError, choices
+from dms_core.validation import plain
 from exo_env.envs.base_env import AssistanceEnv
+from exo_env.envs.settings import check_whole
 from exo_env.tables import STATUS
 from exo_env.tasks.task import NOTHING, SOLVER, Task
 from exo_env.world.batch import Batch
@@ -33,6 +35,8 @@ class AssistanceVectorEnv(VectorEnv):
         autoreset_mode: a gymnasium.vector.AutoresetMode: a new episode begins at the step after the last one's end
             (default), at the same step, or at a call of `reset` only.
         threads: number of threads that step the worlds; None takes one for each core.
+        max_episode_steps: control periods after which time ends an episode, as `gymnasium.make_vec` gives them; None
+            and -1: those of the environment's `episode_duration`.
         settings: settings of the environment.
 
     Raises:
@@ -47,6 +51,7 @@ class AssistanceVectorEnv(VectorEnv):
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
+        max_episode_steps: int | None = None,
         **settings: Any,
     ) -> None:
         if not (isinstance(num_envs, int | np.integer) and num_envs >= 1):
@@ -60,6 +65,11 @@ class AssistanceVectorEnv(VectorEnv):
         self.num_envs = int(num_envs)
         self.envs = [self.env_type(**settings) for _ in range(self.num_envs)]
         one = self.envs[0]
+        self.steps = one.steps
+        """Control periods of an episode that no event ends."""
+        if max_episode_steps not in (None, -1):
+            check_whole("max_episode_steps", plain(max_episode_steps), MOST_STEPS)
+            self.steps = min(self.steps, int(max_episode_steps))
         self.render_mode = one.render_mode
         self.metadata = {**one.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space, self.single_action_space = one.observation_space, one.action_space
@@ -196,7 +206,7 @@ class AssistanceVectorEnv(VectorEnv):
         rewards = np.where(running, self._batch.numbers[:, 0], 0.0)
         self._check_finite(rewards)
         terminated = running & (status[:, STATUS.event] != NOTHING)
-        truncated = running & (status[:, STATUS.step] == self.envs[0].steps)
+        truncated = running & (status[:, STATUS.step] == self.steps)
         infos = self._infos(running) if running.any() else {}
         self._over = ~running | terminated | truncated
         infos = self._begin(~running, infos)
@@ -214,7 +224,7 @@ class AssistanceVectorEnv(VectorEnv):
 
     def _checked(self, actions: Any) -> np.ndarray:
         """The actions, clipped to the box; refuses those that are not finite or of another shape."""
-        used = np.asarray(actions, float)
+        used = np.ascontiguousarray(actions, float)  # any other order would be compiled for anew
         if used.shape != self.action_space.shape:
             raise InputError(f"actions have shape {used.shape}: expected {self.action_space.shape}.")
         if not np.isfinite(used).all():
@@ -275,5 +285,7 @@ class AssistanceVectorEnv(VectorEnv):
             env.close()
 
 
+MOST_STEPS = 10**9
+"""Largest `max_episode_steps`."""
 GROUPED = ("reward_terms", "reward_weights")
 """Keys of a step's infos that hold one number for each world and reward term."""

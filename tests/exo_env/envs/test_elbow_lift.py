@@ -136,3 +136,17 @@ def test_a_copy_draws_from_a_generator_of_its_own(env):
     with pytest.raises(gymnasium.error.ResetNeeded, match="A copy begins without one"):
         _ = copy.copy(env).episode
     assert env.reset()[1] == twin.start_info()
+
+
+def test_numbers_of_numpy_are_taken_as_pythons():
+    number = {
+        "control_rate": np.float32(50), "load": np.float32(1), "cycle": np.int64(3), "repetitions": np.int64(1),
+        "episode_duration": np.float64(2), "rtol": np.float64(1e-3), "patient": {"strength": np.float32(0.5)},
+    }  # fmt: skip
+    python = {name: value if isinstance(value, dict) else value.item() for name, value in number.items()}
+    first, second = ElbowLiftEnv(**number), ElbowLiftEnv(**python)
+    options = {"load": np.float32(1.5), "initial_angle_deg": np.int64(40)}
+    given = first.reset(seed=np.int64(3), options=options)
+    wanted = second.reset(seed=3, options={"load": 1.5, "initial_angle_deg": 40})
+    np.testing.assert_array_equal(given[0], wanted[0])
+    assert given[1] == wanted[1]

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv
 
+from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
+
 ID, SETTINGS = "exo_env:exo/ElbowLift-v1", {"episode_duration": 0.1, "observation": ["device", "emg"]}
 SEEDS, STEPS = [4, 5], 12
 ACTIONS = np.random.default_rng(0).uniform(-1.0, 1.0, (STEPS, len(SEEDS), 2)).astype(np.float32)
@@ -71,3 +73,28 @@ def test_a_vector_gives_what_its_environments_give_alone(kind):
         for step, wanted in zip(steps, alone, strict=True):
             np.testing.assert_array_equal(step[0], wanted[0])
             assert step[1:] == wanted[1:]
+
+
+@pytest.mark.parametrize(("steps", "ends"), [(4, 4), (100, 10), (-1, 10), (None, 10)])
+def test_gymnasium_may_give_a_largest_number_of_steps(steps, ends):
+    worlds = gymnasium.make_vec("exo/ElbowLift-v1", num_envs=2, episode_duration=0.2, max_episode_steps=steps)
+    try:
+        worlds.reset(seed=0)
+        truncated = [worlds.step(np.zeros((2, 2)))[3].tolist() for _ in range(ends)]
+        assert truncated == [[False, False]] * (ends - 1) + [[True, True]]
+    finally:
+        worlds.close()
+
+
+def test_actions_may_lie_in_any_order_in_memory():
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 2))
+    orders = (actions, np.asfortranarray(actions), np.repeat(actions, 2, axis=1)[:, ::2])
+    results = []
+    for order in orders:
+        worlds = ElbowLiftVectorEnv(3)
+        try:
+            worlds.reset(seed=0)
+            results.append(worlds.step(order)[0])
+        finally:
+            worlds.close()
+    assert all(np.array_equal(results[0], x) for x in results[1:])
