@@ -43,11 +43,23 @@ def checked_config(path: Path, changes: tuple[str, ...], environment: str | None
     config = Config.read(path, changes, environment)
     try:
         arguments(config)
+        _check_device(config.training.device)
         check_settings(config.environment, config.env_kwargs)
         _check_critic(config.environment, observed_settings(config))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return config
+
+
+def _check_device(device: str) -> None:
+    """Refuse a device that this machine has not: Stable-Baselines3 would train on the CPU without a word."""
+    import torch
+
+    kind, _, index = device.partition(":")
+    if kind == "cuda" and not int(index or 0) < torch.cuda.device_count():
+        raise InputError(f"training.device = '{device}': PyTorch sees {torch.cuda.device_count()} CUDA devices here.")
+    if kind == "mps" and not torch.backends.mps.is_available():
+        raise InputError("training.device = 'mps': PyTorch sees no such device here; expected 'cpu' or 'auto'.")
 
 
 def _check_critic(environment: str, settings: Mapping[str, Any]) -> None:

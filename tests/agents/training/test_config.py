@@ -175,3 +175,26 @@ def test_nothing_heavy_is_imported_by_the_command_line():
     code = "import sys, agents.__main__; print([m for m in ('torch', 'ray', 'matplotlib', 'onnx') if m in sys.modules])"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[3])
     assert said.stdout.strip() == "[]", said.stderr
+
+
+@pytest.mark.parametrize(
+    ("device", "there", "said"),
+    [
+        ("cuda", 0, "training.device = 'cuda': PyTorch sees 0 CUDA devices"),
+        ("cuda:1", 1, "training.device = 'cuda:1': PyTorch sees 1 CUDA devices"),
+        ("cuda:0", 1, None),
+        ("cpu", 0, None),
+        ("auto", 0, None),
+    ],
+)
+def test_a_device_that_is_not_there_is_refused_before_training(monkeypatch, device, there, said):
+    torch = pytest.importorskip("torch")
+    from agents.training.usable import checked_config
+
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: there)
+    path = SHIPPED[0]
+    if said is None:
+        assert checked_config(path, (f"training.device={device}",)).training.device == device
+    else:
+        with pytest.raises(InputError, match=said):
+            checked_config(path, (f"training.device={device}",))
