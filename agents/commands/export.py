@@ -27,6 +27,7 @@ def export(
     trust: bool = False,
     statistics: Path | None = None,
     algorithm: str = "ppo",
+    action_mode: Annotated[str | None, arg(metavar="MODE")] = None,
     environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
 ) -> int:
     """Write a trained policy as policy.json, weights.safetensors and policy.onnx.
@@ -39,10 +40,11 @@ def export(
         trust: a .zip carries pickles, which can run any code when they are read; say that you trust who made it.
         statistics: vecnormalize.pkl of a .zip, also a pickle.
         algorithm: of a .zip.
+        action_mode: of a .zip, which does not say it: rope_tension, pid_setpoint, or one of your environment's own.
         environment: in which the model of a .zip was trained, by id.
     """
     if source.suffix == ".zip":
-        policy = from_zip(source, statistics, algorithm, trust, environment)
+        policy = from_zip(source, statistics, algorithm, trust, action_mode, environment)
     elif (source / RECORD).is_file():
         folder = RunFolder(source)
         policy = LearnedPolicy.load((folder.checkpoints if last else folder.best).latest())

@@ -15,7 +15,12 @@ from ..training.usable import require_training
 
 
 def from_zip(
-    source: Path, statistics: Path | None, algorithm: str, trust: bool, environment: str = ENVIRONMENT
+    source: Path,
+    statistics: Path | None,
+    algorithm: str,
+    trust: bool,
+    action_mode: str | None,
+    environment: str = ENVIRONMENT,
 ) -> LearnedPolicy:
     """The policy of a file that Stable-Baselines3 saved elsewhere.
 
@@ -24,21 +29,24 @@ def from_zip(
         statistics: vecnormalize.pkl, where observations were normalised.
         algorithm: that trained it.
         trust: whether the user trusts who made the files.
+        action_mode: what its actions do; the file does not say, and another mode may take actions of the same shape.
         environment: id of that in which it was trained.
 
     Raises:
-        InputError: it is not trusted, not whole, or was trained on other observations.
+        InputError: it is not trusted, not whole, its action mode is not said, or it was trained on other observations.
     """
     if not trust:
         raise InputError(
             f"'{source}' carries pickles, which can run any code when they are read. If you trust who made it, give "
             "--trust."
         )
+    if action_mode is None:
+        raise InputError(f"'{source}' does not say what its actions do. Give the --action-mode that it was trained in.")
     require_training()
     from ..training.algorithms import find
     from ..training.extraction import Origin, extract
 
-    model, env = _read(find(algorithm), source), make(environment)
+    model, env = _read(find(algorithm), source), make(environment, action_mode=action_mode)
     try:
         origin = Origin(environment_id(environment), algorithm, model.seed)
         return extract(model, env, origin, _statistics(statistics))

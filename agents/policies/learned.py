@@ -177,7 +177,7 @@ def find_policy(name: str) -> Policy:
         raise InputError(
             f"policy '{name}': a .zip of Stable-Baselines3 carries pickles, which can run any code when they are read. "
             f"If you trust who made it, export it first, and evaluate the folder: "
-            f"{PROGRAM} export {name} --trust --algorithm ppo --out {folder.with_suffix('')}_policy"
+            f"{PROGRAM} export {name} --trust --algorithm ppo --action-mode MODE --out {folder.with_suffix('')}_policy"
         )
     if (folder / DESCRIPTION).is_file():
         return LearnedPolicy.load(folder, name)

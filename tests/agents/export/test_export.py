@@ -226,13 +226,18 @@ def test_zip_from_elsewhere_needs_trust(trained, tmp_path, capsys):
     arguments = ["export", str(path), "--out", str(tmp_path / "out"), "--statistics", str(statistics)]
     assert main(arguments) == 2
     assert "--trust" in capsys.readouterr().err and not (tmp_path / "out").exists()
-    assert main([*arguments, "--trust"]) == 0
+    arguments += ["--trust"]
+    assert main(arguments) == 2
+    assert "Give the --action-mode that it was trained in" in capsys.readouterr().err
+    arguments += ["--action-mode", "pid_setpoint"]
+    assert main(arguments) == 0
     found = LearnedPolicy.load(tmp_path / "out")
     assert all(np.array_equal(found.arrays[k], v) for k, v in run.policy().arrays.items())
+    assert found.description.action_mode == "pid_setpoint"
     for file in (path, statistics):
         whole = file.read_bytes()
         file.write_bytes(whole[: len(whole) // 2])
-        assert main([*arguments, "--trust"]) == 2
+        assert main(arguments) == 2
         errors = capsys.readouterr().err
         assert f"'{file}' is no whole" in errors and errors.count("\n") == 1
         file.write_bytes(whole)
