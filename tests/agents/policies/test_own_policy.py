@@ -73,7 +73,9 @@ def test_a_zip_says_how_it_becomes_a_policy_and_the_command_works(tmp_path, caps
     said = capsys.readouterr().err
     assert "carries pickles" in said and said.count("\n") == 1
     command = said.rpartition("the folder: ")[2].split()
+    command[command.index("MODE")] = "rope_tension"  # only who trained it knows
     assert command[:3] == ["python", "-m", "agents"]
     done = subprocess.run([sys.executable, *command[1:]], cwd=Path(__file__).parents[3], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert find_policy(str(tmp_path / "model_policy")).description.algorithm == "ppo"
+    found = find_policy(str(tmp_path / "model_policy")).description
+    assert (found.algorithm, found.action_mode) == ("ppo", "rope_tension")
