@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 
 class _OldModule(ModuleType):
@@ -48,6 +48,10 @@ class _MovedModule(Loader):
         """Nothing is run twice; the import system has put the old specification into the module, which is undone."""
         if not isinstance(module, _OldModule):
             module.__spec__ = self._spec
+
+    def get_code(self, name: str) -> NoReturn:
+        """Refuse `python -m` with the old name, which would run what is imported by the new one a second time."""
+        raise ImportError(f"'{name}' is now '{self.new}'; run it by that name.", name=name)
 
 
 def moved_name(module: str, name: str, names: Mapping[str, str], new: str | None = None) -> Any:

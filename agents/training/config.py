@@ -148,7 +148,7 @@ def _needed(section: Mapping[str, Any], key: str) -> Any:
 
 def _whole(key: str, value: Any) -> int:
     """A whole number from 1; 1e6 is one."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value) or value < 1:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not float(value).is_integer() or value < 1:
         raise InputError(f"{key} = {value!r}: expected a whole number from 1.")
     return int(value)
 

@@ -33,6 +33,8 @@ def soak(
     """
     if steps < 1:
         raise InputError(f"--steps {steps}: expected a whole number from 1.")
+    if seed < 0:
+        raise InputError(f"--seed {seed}: expected a whole number from 0.")
     drive = {} if action_mode is None else {"action_mode": action_mode}
     with tqdm(total=steps, unit="step", leave=False, disable=None) as bar:
 

@@ -1,5 +1,7 @@
 """Names of version 0.1 load with a warning, or end in an error that names what replaces them."""
 
+import subprocess
+import sys
 from importlib import import_module
 
 import pytest
@@ -65,3 +67,10 @@ def test_a_star_gives_the_names_that_have_moved():
 def test_a_name_that_never_was_is_an_ordinary_error(folder):
     with pytest.raises(AttributeError, match="has no attribute 'horse'"):
         import_module(f"exo_env.{folder}").horse  # noqa: B018
+
+
+def test_python_m_with_an_old_name_says_the_new_one():
+    done = subprocess.run([sys.executable, "-m", "exo_env.soak"], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "'exo_env.soak' is now 'exo_env.envs.soak'; run it by that name." in done.stderr
+    assert "Traceback" not in done.stderr

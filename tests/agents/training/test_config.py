@@ -1,5 +1,6 @@
 """Training configurations: rl_zoo3's format, nothing evaluated, every mistake named."""
 
+import math
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -114,6 +115,8 @@ def test_code_is_never_run(text):
         ("policy = 'CnnPolicy'; ppo takes MlpPolicy", {"policy": "CnnPolicy"}),
         ("n_envs = 0: expected a whole number from 1", {"n_envs": 0}),
         ("n_timesteps = '1e6'", {"n_timesteps": "1e6"}),
+        ("n_timesteps = inf: expected a whole number from 1", {"n_timesteps": math.inf}),
+        ("n_envs = nan: expected a whole number from 1", {"n_envs": math.nan}),
         ("normalize: unknown key 'norm'", {"normalize": {"norm": True}}),
         ("normalize: clip_obs = -1: expected a positive number", {"normalize": {"clip_obs": -1}}),
         ("env_kwargs = 3: expected a mapping", {"env_kwargs": 3}),

@@ -56,6 +56,7 @@ def test_a_device_of_ones_own_and_another_drive(tmp_path, capsys):
     ("arguments", "complaint"),
     [
         (["--steps", "0"], "--steps 0: expected a whole number from 1"),
+        (["--seed", "-1"], "--seed -1: expected a whole number from 0"),
         (["--env", "exo/Nothing-v0"], "environment 'exo/Nothing-v0' is not registered. There are: exo/ElbowLift-v1"),
         (["--env", "no_such_module:a/B-v0"], "module 'no_such_module' cannot be imported"),
         (["--env", "CartPole-v1"], "env = 'CartPole-v1': expected an environment that is an AssistanceEnv"),
