@@ -7,7 +7,9 @@ and the like are text, only `true` and `false` are logical.
 
 from __future__ import annotations
 
+import copy
 import re
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -69,13 +71,20 @@ def read_yaml(path: str | Path) -> Section:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise InputError(f"file '{path}' cannot be read: {reason}.") from None
     try:
-        found = yaml.load(text, Loader=_Loader)
+        # What is handed out is the caller's to change.
+        found = copy.deepcopy(_parsed(text))
     except yaml.YAMLError as error:
         raise InputError(_sentence(path, error)) from None
     if not isinstance(found, Section):
         what = "nothing" if found is None else f"a {type(found).__name__}"
         raise InputError(f"file '{path}' holds {what}. Expected a mapping of keys to values.")
     return found
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str) -> Any:
+    """What a text stands for; kept, since environments of a batch read the same files."""
+    return yaml.load(text, Loader=_Loader)
 
 
 def read_value(text: str) -> Any:

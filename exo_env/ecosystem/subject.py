@@ -168,7 +168,7 @@ def read_subject(source: str | Subject) -> Subject:
         content = path.read_bytes()
     except OSError:
         content = b""  # what reads the file below says why it cannot be read
-    return _read(source if source in _shipped() else str(path.resolve()), path, content)
+    return _read(str(path.resolve()) if _is_file(source) else source, path, content)
 
 
 @lru_cache(maxsize=16)
@@ -189,15 +189,16 @@ AnySubject = Annotated[
 """A subject as a setting: given by name, by path, or as one that was read."""
 
 
-def _shipped() -> list[str]:
-    """Names of the shipped subjects."""
-    return sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
+def _is_file(source: str) -> bool:
+    """Whether a subject is given by the path of a file, not by its name."""
+    return source.endswith((".yaml", ".yml"))
 
 
 def _path(source: str) -> Path:
     """Path of the file of a subject."""
-    if source.endswith((".yaml", ".yml")):
+    if _is_file(source):
         return Path(source)
-    if source not in _shipped():
-        raise InputError(f"subject = {source!r}: expected one of {choices(_shipped())}, or a YAML file.")
+    shipped = sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
+    if source not in shipped:
+        raise InputError(f"subject = {source!r}: expected one of {choices(shipped)}, or a YAML file.")
     return config_file(f"subject/{source}.yaml")

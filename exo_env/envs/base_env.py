@@ -237,7 +237,7 @@ class AssistanceEnv(gymnasium.Env):
         """
         self._episode = Episode(self.world, *self.world.begun(code))
         self._readout = Readout(self.world, self._episode)
-        self.check_finite(self._observation(), 0.0)
+        self.check_finite(self.world.tables.observer.observation, 0.0)
         self._over = False
 
     @cached_property

@@ -65,11 +65,6 @@ def put_lacking(patient, arm, load, link, course, lacking):
     return ability, max(total / course.shape[0], SMALLEST_SCALE)
 
 
-def voluntary_moment(patient: Patient, known: InternalModel, angle: float = MIDDLE) -> float:
-    """Largest static elbow moment that the patient can want [Nm]."""
-    return voluntary(patient.row(), known.arm, angle)
-
-
 def ability(patient: Patient, known: InternalModel) -> float:
     """Share of arm and load that the patient can hold, from 0 to 1 [-].
 

@@ -9,7 +9,7 @@ from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.patient.ability import MIDDLE, SMALLEST_SCALE, Need, ability, put_lacking, voluntary_moment
+from exo_env.patient.ability import MIDDLE, SMALLEST_SCALE, Need, ability, put_lacking, voluntary
 from exo_env.patient.motor_command import InternalModel, plan_course
 from exo_env.patient.patient import Patient
 from exo_env.tasks.repetition import Repetition
@@ -42,13 +42,13 @@ def test_moment_of_muscles_is_that_of_the_motor_command():
 def test_voluntary_moment_is_that_of_full_flexors_less_co_contraction():
     model = known()
     full = model.muscle_moment(MIDDLE, np.where(Arm().signs > 0.0, 1.0, 0.01))
-    assert voluntary_moment(Patient(), model) == pytest.approx(full, rel=1e-12)
+    assert voluntary(Patient().row(), model.arm, MIDDLE) == pytest.approx(full, rel=1e-12)
     both = model.muscle_moment(MIDDLE, np.where(Arm().signs > 0.0, 0.32, 0.1))
     weak = Patient(maximum_activation_flexors=0.4, fatigued_at_start=0.2, co_contraction=0.25)
-    assert voluntary_moment(weak, model) == pytest.approx(both, rel=1e-12)
+    assert voluntary(weak.row(), model.arm, MIDDLE) == pytest.approx(both, rel=1e-12)
     # No more is driven against it than the extensors have left.
     limp = weak.changed(maximum_activation_extensors=0.05)
-    assert voluntary_moment(limp, model) > voluntary_moment(weak, model)
+    assert voluntary(limp.row(), model.arm, MIDDLE) > voluntary(weak.row(), model.arm, MIDDLE)
 
 
 def test_ability_falls_with_weakness_and_load_and_stays_within_its_range():
