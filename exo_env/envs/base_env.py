@@ -38,6 +38,7 @@ from exo_env.drives.drive import Drive, checked_action
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
+from exo_env.ecosystem.subject import read_subject
 from exo_env.envs.draw import EpisodeDraws, Keys
 from exo_env.envs.settings import (
     SOLVER_OPTIONS,
@@ -125,7 +126,7 @@ class AssistanceEnv(gymnasium.Env):
     def made_ecosystem(self, settings: EnvSettings) -> Ecosystem:
         """Arm, device and machine of the settings."""
         return self.ecosystem_type(
-            device=worn_device(settings.exoskeleton), subject=settings.subject,
+            device=worn_device(settings.exoskeleton), subject=read_subject(settings.subject),
             misalignment=worn_misalignment(settings.misalignment),
         )  # fmt: skip
 
