@@ -32,7 +32,6 @@ from dms_core.compiled.arena import (
     table_at,
 )
 from dms_core.compiled.calls import TABLE, TABLE_CALL, address, call_with_table
-from dms_core.compiled.compilation import drop_stale_code
 from dms_core.compiled.jit import compiled
 from dms_core.compiled.side_by_side import register as compile_beside_models
 from dms_core.simulation.newton import largest_errors
@@ -64,7 +63,6 @@ __all__ = [
     "compile_beside_models",
     "compiled",
     "constraint_gap",
-    "drop_stale_code",
     "fields",
     "flags",
     "floats",

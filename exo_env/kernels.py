@@ -6,12 +6,11 @@ A kernel is a compiled function of one packed world w, decorated with `compiled`
     action, wanted = floats(drive, DRIVE.action), floats(drive, DRIVE.wanted)
 
 and, in a task, `readings(w)`, `first_of(w)`, `terms_of(w)`, `task_numbers(w)`, `step_of(w)` and `end_with(w, code)`.
-All tables and their fields are in exo_env/tables.py. numba keeps the machine code beside the file; it compiles
-anew when that file changes, but not when one changes that its constants come from: `drop_stale_code(folder)` of
-dms_core.kernels, called in the package's own __init__, sees to that.
+All tables and their fields are in exo_env/tables.py. The machine code is kept on disk and used as long as nothing has
+changed that went into it: the kernel, what it calls, and the constants that they name, in whichever file.
 """
 
-from dms_core.kernels import drop_stale_code, flags, floats, inner, ints, matrix
+from dms_core.kernels import flags, floats, inner, ints, matrix
 from exo_env.jit import compiled
 from exo_env.places import places
 from exo_env.tables import (
@@ -56,7 +55,6 @@ __all__ = [
     "TASK",
     "WORLD",
     "compiled",
-    "drop_stale_code",
     "end_with",
     "event_of",
     "first_of",

@@ -1,25 +1,16 @@
-"""Machine code on disk: kept while the sources are the same, dropped when they change, announced when it is missing.
-
-numba keeps compiled functions beside their source and compiles one anew when its own file changes, but not when a
-function that it calls from another file does. After an update of some files, machine code of the old version would run
-in silence; so all of it is dropped whenever any compiled source of the package has changed.
-"""
+"""Compiling is announced when it happens: what is compiled, and how far it is."""
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import math
 import sys
 import time
-from pathlib import Path
 from typing import Any, TextIO
 
 from numba.core import event
 from numba.core.caching import NullCache
 
-PACKAGE = Path(__file__).parents[1]
-STAMP = "compiled_sources.sha256"
 QUIET = 1.0
 """Pause after which more compiling is announced again [s]."""
 INTERVAL = 10.0
@@ -28,34 +19,20 @@ WIDTH = 79
 """Characters of the line on a terminal."""
 CALLED = "_called"
 """End of the name under which a function is compiled for callers that are compiled themselves."""
-SHAPING = (b"@compiled", b"NamedTuple", b"places(", b"trait(")
-"""What a source holds that shapes compiled code: functions, or the places of what they read."""
-LAYOUT = ("assembly", "compiled")
-"""Folders all of whose sources count, whether they hold such a thing or not."""
 
 
-def fingerprint(package: Path = PACKAGE) -> str:
-    """Hash of every source file that shapes compiled functions, of this package and of one built on it."""
-    digest = hashlib.sha256()
-    for folder in dict.fromkeys((PACKAGE, package)):
-        for path in sorted(folder.rglob("*.py")):
-            text, place = path.read_bytes(), path.relative_to(folder)
-            if any(mark in text for mark in SHAPING) or place.parts[0] in LAYOUT:
-                digest.update(place.as_posix().encode() + b"\0" + text)
-    return digest.hexdigest()
+def write(text: str, stream: TextIO | None = None) -> None:
+    """Write to a stream, or to stderr; where that is closed, gone or full, nobody reads it and nothing fails."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        to = stream or sys.stderr
+        to.write(text)
+        to.flush()
 
 
-def drop_stale_code(package: Path = PACKAGE) -> None:
-    """Remove numba's files of a package if they belong to other sources. Without write access nothing is done."""
-    now, stamp = fingerprint(package), package / "__pycache__" / STAMP
-    with contextlib.suppress(OSError):
-        if stamp.is_file() and stamp.read_text() == now:
-            return
-        for pattern in ("*.nbi", "*.nbc"):
-            for path in package.rglob(f"__pycache__/{pattern}"):
-                path.unlink(missing_ok=True)
-        stamp.parent.mkdir(exist_ok=True)
-        stamp.write_text(now)
+def _is_terminal(stream: TextIO | None) -> bool:
+    with contextlib.suppress(ValueError):
+        return stream is not None and stream.isatty()
+    return False
 
 
 _functions = 0
@@ -80,10 +57,13 @@ class _Announcer(event.Listener):
         self._depth, self._ended, self._done = 0, -math.inf, 0
         self._began = self._spoke = 0.0
 
+    def _write(self, text: str) -> None:
+        """Words go to what stderr is now, since who has redirected it may have closed what it was."""
+        write(text, self._given)
+
     @property
-    def _stream(self) -> TextIO:
-        """Where words go: to what stderr is now, since who has redirected it may have closed what it was."""
-        return self._given or sys.stderr
+    def _on_terminal(self) -> bool:
+        return _is_terminal(self._given or sys.stderr)
 
     def on_start(self, event: event.Event) -> None:
         """A function begins to be compiled; those that are not kept on disk are small and not worth a word."""
@@ -104,18 +84,16 @@ class _Announcer(event.Listener):
         self._done += 1
         if self._depth == 0:
             self._ended = time.monotonic()
-            if self._stream.isatty():
-                self._stream.write("\r" + " " * WIDTH + "\r")
-                self._stream.flush()
+            if self._on_terminal:
+                self._write("\r" + " " * WIDTH + "\r")
 
     def wait(self) -> None:
         """Nothing is compiled here until a second process has done its share."""
-        if self._stream.isatty():
-            self._stream.write("\rdms_core: waiting for code that a second process compiles".ljust(WIDTH))
-            self._stream.flush()
+        if self._on_terminal:
+            self._write("\rdms_core: waiting for code that a second process compiles".ljust(WIDTH))
 
     def _say(self, text: str) -> None:
-        print(f"dms_core: {text}", file=self._stream, flush=True)
+        self._write(f"dms_core: {text}\n")
 
     def _show(self, function: Any, now: float) -> None:
         """The function at work, and how many are done."""
@@ -123,17 +101,16 @@ class _Announcer(event.Listener):
         name = f"{function.__module__.rpartition('.')[2]}.{function.__name__.removesuffix(CALLED)}"
         total = max(_functions, self._done + 1)
         text = f"{self._done} of at most {total} functions, {now - self._began:.0f} s: {name}"
-        if self._stream.isatty():
-            self._stream.write(f"\rdms_core: {text}"[:WIDTH].ljust(WIDTH))
-            self._stream.flush()
+        if self._on_terminal:
+            self._write(f"\rdms_core: {text}"[:WIDTH].ljust(WIDTH))
         elif now - self._spoke > INTERVAL:
             self._spoke = now
             self._say(text)
 
 
 def _kept(event: event.Event) -> bool:
-    """Whether what is compiled is kept on disk."""
-    return not isinstance(event.data["dispatcher"]._cache, NullCache)
+    """Whether what is compiled is to be kept on disk."""
+    return type(event.data["dispatcher"]._cache) is not NullCache
 
 
 _announcer: _Announcer | None = None

@@ -12,14 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.core.caching import NullCache
 from numba.extending import is_jitted
 
 from dms_core.assembly.layout import Call, Layout
 from dms_core.assembly.tables import CALLS, WORK, Calls, flat
 from dms_core.compiled.arena import fields, floats, indices, ints, matrix
 from dms_core.compiled.calls import ENTRY, address
-from dms_core.compiled.compilation import fingerprint
 from dms_core.compiled.jit import compiled
+from dms_core.compiled.kept_code import keep
 from dms_core.errors import ModelError
 from dms_core.model.element import CONSTRAINT, DYNAMIC, INPUT_DERIVATIVE, PARAMETER_DERIVATIVE, SENSOR
 
@@ -101,20 +102,13 @@ _ENTRIES = {
 
 
 @cache
-def _state_of_package() -> str:
-    return fingerprint()[:12]
-
-
-@cache
 def entry(kernel: Any, signature: Any) -> Any:
     """The function (calls, e, w, level) that runs `kernel` on the local arrays of call e.
 
-    It counts as a function of the kernel's file, where numba keeps its machine code if it keeps the kernel's; the
-    places of the arrays are part of that code, so the state of this package is part of the name. What a kernel takes
-    from a function around it numba would not see, so such an entry is not kept.
+    It counts as a function of the kernel's file, where its machine code is kept if the kernel's is.
     """
     function, form = kernel.py_func, _ENTRIES[signature]
-    name, origin = f"{function.__name__}_entry_{_state_of_package()}", function.__code__
+    name, origin = f"{function.__name__}_entry", function.__code__
     code = form.__code__.replace(
         co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
     )
@@ -126,8 +120,10 @@ def entry(kernel: Any, signature: Any) -> Any:
     known = {**form.__globals__, "_kernel": within}
     found = FunctionType(code, known, name)
     found.__module__, found.__qualname__ = function.__module__, name
-    kept = kernel.stats.cache_path is not None and function.__closure__ is None
-    return njit(found, cache=kept, **habits)
+    made = njit(found, **habits)
+    if type(kernel._cache) is not NullCache:
+        keep(made)
+    return made
 
 
 def derivative_kernel(element: type, attribute: str) -> Any:

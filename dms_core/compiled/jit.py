@@ -11,11 +11,18 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
-from numba import njit, types
+from numba import config, njit, types
 
-from dms_core.compiled.compilation import CALLED, count_function, drop_stale_code
+from dms_core.compiled.compilation import CALLED, count_function, write
+from dms_core.compiled.kept_code import keep
 
-drop_stale_code()
+_settings: Any = config
+if _settings.DISABLE_JIT:
+    _settings.DISABLE_JIT = 0
+    write(
+        "dms_core: NUMBA_DISABLE_JIT is set, and off from here on: this package's functions call each other by "
+        "addresses of machine code.\n"
+    )
 
 
 def compiled(function: Callable | None = None, makes_arrays: bool | None = None, **options: Any) -> Any:
@@ -31,9 +38,11 @@ def compiled(function: Callable | None = None, makes_arrays: bool | None = None,
     if function is None:
         return lambda f: compiled(f, makes_arrays, **options)
     counted = not function.__module__.startswith("dms_core.") if makes_arrays is None else makes_arrays
-    habits: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": counted}
+    habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": counted}
     dispatcher = njit(**habits, **options)(function)
     inner = njit(**{**habits, **options, "no_cpython_wrapper": True})(_renamed(function))
+    keep(dispatcher)
+    keep(inner)
     by_types = inner.get_call_template
 
     def get_call_template(args: tuple, kws: dict) -> Any:

@@ -17,7 +17,6 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from dms_core.compiled.compilation import announce_waiting
@@ -75,9 +74,9 @@ def work(names: Sequence[str]) -> None:
 
 
 def _on_disk(function: Any) -> bool:
-    """Whether numba holds machine code of a function, or could not keep any."""
-    folder = function.stats.cache_path
-    return folder is None or any(Path(folder).glob(f"*.{function.py_func.__qualname__}-*.nbi"))
+    """Whether there is machine code of a function that fits, or no place to keep any."""
+    kept = function._cache
+    return kept.cache_path is None or kept.fits
 
 
 def _processors() -> int:

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dms_core.compiled.compilation import STAMP, fingerprint
 from dms_core.config_files import configs
 
 CHECKOUT = configs().parent
@@ -30,19 +29,9 @@ sys.meta_path.insert(0, Block())
 
 
 def _lend_machine_code(site: Path) -> None:
-    """Put what numba compiled for the checkout beside the same sources in `site`, so that a minute is saved.
-
-    numba takes compiled code for that of a source file of the same time and size; the times are made equal only where
-    the bytes are. Without compiled code in the checkout the installed copy compiles its own.
-    """
+    """Put what was compiled for the checkout beside the same sources in `site`, so that a minute is saved."""
     for package in ("dms_core", "exo_env"):
-        for source in (CHECKOUT / package).rglob("*.py"):
-            installed = site / source.relative_to(CHECKOUT)
-            assert installed.read_bytes() == source.read_bytes()
-            stat = source.stat()
-            os.utime(installed, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-        kept = [p for end in ("nbi", "nbc", "sha256") for p in (CHECKOUT / package).rglob(f"__pycache__/*.{end}")]
-        for code in kept:
+        for code in [p for end in ("nbi", "nbc") for p in (CHECKOUT / package).rglob(f"__pycache__/*.{end}")]:
             to = site / code.relative_to(CHECKOUT)
             to.parent.mkdir(exist_ok=True)
             shutil.copyfile(code, to)
@@ -98,13 +87,7 @@ def without_the_lift(run, installed, tmp_path_factory) -> Path:
     """A folder with an exo_env from which the lift task is missing, with what numba has compiled of the rest."""
     folder = tmp_path_factory.mktemp("without")
     shutil.copytree(installed[1] / "exo_env", folder / "exo_env")
-    for source in (installed[1] / "exo_env").rglob("*.py"):
-        stat = source.stat()
-        os.utime(folder / source.relative_to(installed[1]), ns=(stat.st_atime_ns, stat.st_mtime_ns))
     (folder / "exo_env" / "tasks" / "lift.py").unlink()
-    kept = folder / "exo_env" / "__pycache__" / STAMP
-    if kept.is_file():
-        kept.write_text(fingerprint(folder / "exo_env"))
     return folder
 
 

@@ -32,9 +32,7 @@ def fresh(monkeypatch, tmp_path):
     monkeypatch.setattr(side_by_side.atexit, "register", lambda function: None)
     (tmp_path / "pieces.py").write_text(WORK)
     monkeypatch.syspath_prepend(str(tmp_path))
-    return SimpleNamespace(
-        stats=SimpleNamespace(cache_path=str(tmp_path)), py_func=SimpleNamespace(__qualname__="last")
-    )
+    return SimpleNamespace(_cache=SimpleNamespace(cache_path=str(tmp_path), fits=False))
 
 
 def test_the_first_process_waits_for_what_it_names(fresh, tmp_path):
@@ -47,8 +45,8 @@ def test_the_first_process_waits_for_what_it_names(fresh, tmp_path):
     assert side_by_side._done == {"pieces:first"}
 
 
-def test_nothing_begins_where_the_code_is_on_disk(fresh, tmp_path):
-    (tmp_path / "file.last-12.py311.nbi").touch()
+def test_nothing_begins_where_the_code_is_on_disk(fresh):
+    fresh._cache.fits = True
     side_by_side.begin(["pieces:first"], fresh)
     assert side_by_side._process is None
 
