@@ -73,7 +73,7 @@ class _Announcer(event.Listener):
         now = time.monotonic()
         if self._depth == 1 and now - self._ended > QUIET:
             self._began, self._spoke = now, now
-            self._say("compiling what is new, kept on disk (seconds; about a minute the very first time) ...")
+            self._say("compiling what is new (seconds; about a minute the very first time) ...")
         self._show(event.data["dispatcher"].py_func, now)
 
     def on_end(self, event: event.Event) -> None:
