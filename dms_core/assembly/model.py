@@ -9,7 +9,8 @@ import numpy as np
 
 from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
-from dms_core.assembly.layout import Layout, same_structure
+from dms_core.assembly.finite import check_finite, open_call
+from dms_core.assembly.layout import Call, Layout, same_structure
 from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
@@ -68,9 +69,12 @@ class Model:
         # Which rows are redundant depends on the numbers too: an exact alignment may be lost.
         reuse_rows = known is not None and len(known.start.redundant) == 0
         rows_of = known.start if known is not None and reuse_rows else None
+        q, v = layout.start()
+        check_finite(layout, self.open_call(q[: self.n_q], v[: self.n_q], constraints_only=True))
         self.start: Start = assemble(layout, self._signals, self.constraint_jacobian, rows_of)
         if known is not None and not np.array_equal(self.start.active, known.start.active):
             known = None
+        check_finite(layout, self.open_call(self.start.q, self.start.v))
         self._welds = Packed(find_welds(layout, self.start.active, self.constraint_jacobian(self.start.q)[2]))
         self.start.v[self.welds.coordinates] = 0.0
         if known:
@@ -175,6 +179,16 @@ class Model:
                 f"system '{self.system.name}': '{name}' is no input. Declared: {choices(self.layout.input_index)}."
             )
         return self.layout.input_index[name]
+
+    def open_call(self, q: np.ndarray, v: np.ndarray, t: float = 0.0, constraints_only: bool = False) -> Call | None:
+        """The first element whose equations, or their derivatives, are not finite at q, v, shape (n_q,); else None."""
+        w = self.new_work()
+        w.q[: self.n_q], w.v[: self.n_q] = q, v
+        packed, dynamics = Packed(w), self._dynamics.values
+        if constraints_only:
+            dynamics = dynamics._replace(kernel=dynamics.kernel[:0])
+        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
+        return open_call(self.layout, Packed(dynamics).table, self._constraints.table, packed.table)
 
     def constraint_jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[np.ndarray, ...]:
         """(phi, phi_q v + phi_t, phi_q, (phi_q v)_q) at q, v: shapes (n_phi,), (n_phi,), (n_phi, n_q) twice."""
