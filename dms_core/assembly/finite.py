@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -11,12 +13,15 @@ from dms_core.assembly.local import evaluate_constraint, evaluate_dynamic, views
 from dms_core.assembly.tables import WORK
 from dms_core.compiled.arena import matrix
 from dms_core.compiled.jit import compiled
-from dms_core.errors import ModelError
+from dms_core.errors import AssemblyError, ModelError
 from dms_core.model.element import GROUND
+from dms_core.model.system import System
 from dms_core.validation import numbers_in
 
 NAMED = 3
 """Numbers that a sentence names: those farthest from 1."""
+FAR = 9
+"""Powers of ten from 1 at which a number is named where equations fail without telling why."""
 
 
 @compiled
@@ -80,6 +85,29 @@ def sentence(layout: Layout, call: Call) -> str:
         f" Its numbers farthest from 1: {', '.join(most)}; expected ones with which they stay finite." if most else ""
     )
     return f"{element.kind} '{element.name}': its equations are not finite.{hint}"
+
+
+def far_numbers(system: System) -> str:
+    """The declared numbers that are so far from 1 that they may be why, as a sentence with a space before it."""
+    found = []
+    for element in system.everything():
+        for key, x in numbers_in(element):
+            if x != 0.0 and not 10.0**-FAR < abs(x) < 10.0**FAR:
+                found.append((abs(math.log10(abs(x))), f"{key} = {x} of {element.kind} '{element.name}'"))
+    most = [said for _, said in sorted(found, reverse=True)[:NAMED]]
+    return f" Look at numbers far from 1 in SI units: {', '.join(most)}." if most else ""
+
+
+@contextlib.contextmanager
+def naming_far_numbers(system: System) -> Iterator[None]:
+    """Within, equations that cannot be solved are an error that names the numbers that may be why."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise ModelError(f"system '{system.name}': {error}.{far_numbers(system)}") from None
+    except (AssemblyError, ModelError) as error:
+        error.args = (f"{error}{far_numbers(system)}",)
+        raise
 
 
 def check_finite(layout: Layout, call: Call | None) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
-from dms_core.assembly.finite import check_finite, open_call
+from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
 from dms_core.assembly.layout import Call, Layout, same_structure
 from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
 from dms_core.assembly.order_code import ORDER_CODE
@@ -65,6 +65,17 @@ class Model:
         self._dynamics, self._constraints, self._sensors = (Packed(calls) for calls in all_calls(layout))
         self._signals, self._keep_alive = signal_tables(layout)
         self.second_order = np.array([c.differential_rate for c in layout.coordinates])
+        with naming_far_numbers(system):
+            self._solve_start(like)
+        self._composed = Packed(composition(layout))
+        self._sensor_work = Packed(self.new_work())
+        self.sensing = new_sensing(self._dynamics, self._constraints, self._sensors, self._composed, self._sensor_work)
+        read = {k for e in self._composed.values.constraint if e >= 0 for k in self._rows_of(e)}
+        self._reads_welds = bool(read & set(self.welds.rows))
+
+    def _solve_start(self, like: Model | None) -> None:
+        """Start, welds and tables; rows and orders of elimination of `like` where it has the same structure."""
+        layout = self.layout
         known = like if like is not None and same_structure(like.layout, layout) else None
         # Which rows are redundant depends on the numbers too: an exact alignment may be lost.
         reuse_rows = known is not None and len(known.start.redundant) == 0
@@ -81,11 +92,6 @@ class Model:
             self._tables = Packed(self._with_orders_of(known))
         else:
             self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0))
-        self._composed = Packed(composition(layout))
-        self._sensor_work = Packed(self.new_work())
-        self.sensing = new_sensing(self._dynamics, self._constraints, self._sensors, self._composed, self._sensor_work)
-        read = {k for e in self._composed.values.constraint if e >= 0 for k in self._rows_of(e)}
-        self._reads_welds = bool(read & set(self.welds.rows))
 
     def _rows_of(self, constraint: int) -> range:
         """Rows of a constraint by its number."""

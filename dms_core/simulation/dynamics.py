@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dms_core.assembly.finite import open_call, sentence
+from dms_core.assembly.finite import FAR, far_numbers, open_call, sentence
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import MODEL, Tables, with_settings
 from dms_core.compiled.arena import Packed, inner
@@ -192,14 +192,21 @@ class World(Inspection):
             return ""
         table = self._tables.table
         dynamics, constraints = inner(table, MODEL.dynamics), inner(table, MODEL.constraints)
+        far = far_numbers(self.model.system) + self._far_inputs()
         call = open_call(self.model.layout, dynamics, constraints, inner(self._world.table, STATE.w))
         if call is not None:
             return f" {sentence(self.model.layout, call)}"
         if self.result is Result.MATRIX_SINGULAR and self._singular:
-            return f" There {self._singular}"
+            return f" There {self._singular}{far}"
         name = widest_coordinate(self.model, self._tables.values, self.state, self.result is Result.RATES_FAILED)
         kind = self.model.system.element(name.rpartition(".")[0]).kind
-        return f" It goes wrong first at '{name}' ({kind})."
+        return f" It goes wrong first at '{name}' ({kind}).{far}"
+
+    def _far_inputs(self) -> str:
+        """The inputs that were set so far from 1 that they may be why a run failed; as `far_numbers`."""
+        values = zip(self.model.layout.input_index, self.state.w.u[:, 0], strict=True)
+        far = [f"'{name}' = {x}" for name, x in values if abs(x) > 10.0**FAR]
+        return f" Look at inputs far from 1 in SI units: {', '.join(far)}." if far else ""
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
