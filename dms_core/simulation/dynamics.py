@@ -186,6 +186,19 @@ class World(Inspection):
         clock[CLOCK.h_wanted] *= 0.25
         return self.options.fixed_step is None and bool(clock[CLOCK.h_wanted] > self.options.h_min)
 
+    @property
+    def message(self) -> str:
+        """How the last call of `advance` ended, in sentences: where it went wrong, or which steps were shorter."""
+        message, asked, shortest = self.result.value, self.options.fixed_step, self.stats().smallest_step
+        if self.result is not Result.SUCCESS:
+            return f"{message} Stopped at t = {self.time:.6g} s.{self._culprit()}"
+        if asked and 0.0 < shortest < asked * (1.0 - WHOLE):
+            message += (
+                f" Steps of {asked:.6g} s; the shortest, which ends on a jump of an input or on an end time that is no "
+                f"multiple of that, is {shortest:.6g} s."
+            )
+        return message
+
     def _culprit(self) -> str:
         """Where the last attempt at a step failed, as a sentence with a space before it; empty where nothing did."""
         if self.result in (Result.SUCCESS, Result.INTERRUPTED):
@@ -200,7 +213,8 @@ class World(Inspection):
             return f" There {self._singular}{far}"
         name = widest_coordinate(self.model, self._tables.values, self.state, self.result is Result.RATES_FAILED)
         kind = self.model.system.element(name.rpartition(".")[0]).kind
-        return f" It goes wrong first at '{name}' ({kind}).{far}"
+        where = "Steps are held small first by" if self.result is Result.TOO_MANY_STEPS else "It goes wrong first at"
+        return f" {where} '{name}' ({kind}).{far}"
 
     def _far_inputs(self) -> str:
         """The inputs that were set so far from 1 that they may be why a run failed; as `far_numbers`."""
@@ -277,17 +291,9 @@ class Simulation(World):
     def trajectory(self) -> Trajectory:
         """Everything computed so far."""
         if not self._rows or not sum(len(r) for r in self._rows):
-            raise SimulationError(f"nothing was computed: {self.result.value}{self._culprit()}")
-        message, stats = self.result.value, self.stats()
-        if self.result is not Result.SUCCESS:
-            message = f"{message} Stopped at t = {self.time:.6g} s.{self._culprit()}"
-        elif self.options.fixed_step and stats.smallest_step < self.options.fixed_step * (1.0 - WHOLE):
-            message = (
-                f"{message} Steps of {self.options.fixed_step:.6g} s; the shortest, which ends on a jump of an input "
-                f"or on an end time that is no multiple of that, is {stats.smallest_step:.6g} s."
-            )
+            raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
-        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, stats, message)
+        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message)
 
 
 def simulate(
