@@ -85,9 +85,10 @@ def run(
         out: CSV file to write; its folder is made where it is missing.
         rtol: relative tolerance of the error.
         atol: absolute tolerance of every variable in its own unit; default: rtol times the variable's nominal size.
-        sample: time between rows [s], the last row at the end time; default: the solver's own steps.
+        sample: time between rows [s], the last row at the end time; at most t_end; default: the solver's own steps.
         stats: JSON file for the solver's statistics.
-        step: constant step [s] instead of error control; rtol then only sets how far Newton's method goes.
+        step: constant step [s], at most t_end, instead of error control; rtol then only sets how far Newton's method
+            goes. Where t_end is no multiple of it, the last step is shorter, and the message says so.
     """
     if not (np.isfinite(t_end) and t_end > 0.0):
         raise InputError(f"--t-end: Expected a positive time [s], got {t_end}.")
@@ -96,6 +97,9 @@ def run(
     for name, value in (("--rtol", rtol), ("--atol", atol), ("--step", step)):
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{name}: Expected a positive number, got {value}.")
+    for name, value in (("--step", step), ("--sample", sample)):
+        if value is not None and value > t_end:
+            raise InputError(f"{name}: Expected at most --t-end = {t_end} s, got {value} s.")
     options = SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
     for path in (out, stats):
         if path is not None:
@@ -107,7 +111,7 @@ def run(
     write_csv(out, table(trajectory, sample))
     summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
     if stats is not None:
-        write_json(stats, summary)
+        write_json(stats, {**summary, "flags": [flag.as_dict() for flag in trajectory.flags]})
     for key, value in summary.items():
         print(
             f"{key.replace('_', ' ')}: {value:.4g}" if isinstance(value, float) else f"{key.replace('_', ' ')}: {value}"

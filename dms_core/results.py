@@ -11,7 +11,8 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals
-from dms_core.errors import DmsError, SimulationError, choices
+from dms_core.errors import DmsError, InputError, SimulationError, choices
+from dms_core.flags import Flag, Limits, input_values
 
 
 class Result(Enum):
@@ -67,7 +68,7 @@ class Trajectory:
         t: solver times [s], shape (n,).
         q, v, a: coordinates, velocities, accelerations at these times, shape (n, n_q).
         lam, mu: multipliers, shape (n, n_phi); unique (least norm) where constraints are redundant.
-        result: how the run ended; `message` is its sentence with time and numbers.
+        result: how the run ended; `message` is its sentence with time and numbers, and those of the flags.
         stats: counts and worst errors.
     """
 
@@ -80,7 +81,21 @@ class Trajectory:
         self.q, self.v, self.a = (record[:, 1 + k * n : 1 + (k + 1) * n].copy() for k in range(3))
         self._lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
         self.mu = record[:, 1 + 3 * n + m :].copy()
-        self.result, self.stats, self.message = result, stats, message
+        self.result, self.stats, self._message = result, stats, message
+
+    @cached_property
+    def flags(self) -> tuple[Flag, ...]:
+        """Elements that left the range they are meant for, with when and how far: ropes that push, fibres at an end."""
+        limits, behind = Limits(self.model), _behind_jumps(self.t)
+        lam = self.lam if limits.reads("multiplier") else self._lam
+        reads = limits.reads("input")
+        u = input_values(self.model, self.signals, self.t, behind) if reads else np.zeros((0, 0))
+        return limits.left(self.t, self.q, lam, u)
+
+    @cached_property
+    def message(self) -> str:
+        """How the run ended, and every flag, in sentences."""
+        return " ".join([self._message, *(flag.sentence for flag in self.flags)])
 
     @cached_property
     def _whole_lam(self) -> np.ndarray:
@@ -134,11 +149,18 @@ class Trajectory:
         unique, whole = self.model.unique_multipliers, self._whole_lam
         lam = (1.0 - x) * unique(self.q[start], whole[start]) + x * unique(self.q[end], whole[end])
         mu = (1.0 - x) * self.mu[start] + x * self.mu[end]
+        q = np.maximum(q, [c.least for c in self.model.layout.coordinates])
         v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
         return States(self.model, self.signals, times, q, v, a, lam, mu)
 
     def grid(self, sample: float) -> np.ndarray:
-        """Times 0, sample, 2 sample, ... of the run, and its end [s]."""
+        """Times 0, sample, 2 sample, ... of the run, and its end [s].
+
+        Raises:
+            InputError: `sample` is no positive time.
+        """
+        if not (np.isfinite(sample) and sample > 0.0):
+            raise InputError(f"sample: Expected a positive time, got {sample} s.")
         end = self.t[-1]
         # A multiple of `sample` that rounding puts just behind the end still counts.
         times = np.minimum(np.arange(int(np.floor(end / sample * (1.0 + 1e-12))) + 1) * sample, end)

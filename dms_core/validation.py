@@ -8,7 +8,7 @@ Each sentence names the element, the key, the value and what would be right:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -60,6 +60,34 @@ class Checked(BaseModel):
             label = getattr(type(self), "kind", "") or type(self).__name__
             who = f"{label} '{data.get('name', '?')}'" if "name" in type(self).model_fields else label
             raise self.wrong(sentences(error, who, type(self).model_fields)) from None
+
+
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes of the numbers of a declaration: products of as many as an equation has stay far from the ends of what a float
+holds, and in SI units nothing that moves is smaller or larger."""
+
+
+def numbers_in(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
+    """Every number in a declaration, by its keys and places joined with dots ('path.1.point.0')."""
+    if isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            yield from numbers_in(getattr(value, name), f"{key}.{name}" if key else name)
+    elif isinstance(value, tuple):
+        for k, item in enumerate(value):
+            yield from numbers_in(item, f"{key}.{k}")
+    elif isinstance(value, float):
+        yield key, value
+
+
+def check_sizes(value: BaseModel) -> None:
+    """Refuse numbers that are no measure of anything, with which equations overflow.
+
+    Raises:
+        ValueError: names the key and what is allowed.
+    """
+    for key, number in numbers_in(value):
+        if number != 0.0 and not SMALLEST <= abs(number) <= LARGEST:
+            raise ValueError(f"{key} = {number}: Expected 0 or a number of a size from {SMALLEST:g} to {LARGEST:g}")
 
 
 def sentences(error: ValidationError, who: str, allowed: Any = ()) -> str:

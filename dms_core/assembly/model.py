@@ -9,7 +9,8 @@ import numpy as np
 
 from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
-from dms_core.assembly.layout import Layout, same_structure
+from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
+from dms_core.assembly.layout import Call, Layout, same_structure
 from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
@@ -64,24 +65,33 @@ class Model:
         self._dynamics, self._constraints, self._sensors = (Packed(calls) for calls in all_calls(layout))
         self._signals, self._keep_alive = signal_tables(layout)
         self.second_order = np.array([c.differential_rate for c in layout.coordinates])
+        with naming_far_numbers(system):
+            self._solve_start(like)
+        self._composed = Packed(composition(layout))
+        self._sensor_work = Packed(self.new_work())
+        self.sensing = new_sensing(self._dynamics, self._constraints, self._sensors, self._composed, self._sensor_work)
+        read = {k for e in self._composed.values.constraint if e >= 0 for k in self._rows_of(e)}
+        self._reads_welds = bool(read & set(self.welds.rows))
+
+    def _solve_start(self, like: Model | None) -> None:
+        """Start, welds and tables; rows and orders of elimination of `like` where it has the same structure."""
+        layout = self.layout
         known = like if like is not None and same_structure(like.layout, layout) else None
         # Which rows are redundant depends on the numbers too: an exact alignment may be lost.
         reuse_rows = known is not None and len(known.start.redundant) == 0
         rows_of = known.start if known is not None and reuse_rows else None
+        q, v = layout.start()
+        check_finite(layout, self.open_call(q[: self.n_q], v[: self.n_q], constraints_only=True))
         self.start: Start = assemble(layout, self._signals, self.constraint_jacobian, rows_of)
         if known is not None and not np.array_equal(self.start.active, known.start.active):
             known = None
+        check_finite(layout, self.open_call(self.start.q, self.start.v))
         self._welds = Packed(find_welds(layout, self.start.active, self.constraint_jacobian(self.start.q)[2]))
         self.start.v[self.welds.coordinates] = 0.0
         if known:
             self._tables = Packed(self._with_orders_of(known))
         else:
             self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0))
-        self._composed = Packed(composition(layout))
-        self._sensor_work = Packed(self.new_work())
-        self.sensing = new_sensing(self._dynamics, self._constraints, self._sensors, self._composed, self._sensor_work)
-        read = {k for e in self._composed.values.constraint if e >= 0 for k in self._rows_of(e)}
-        self._reads_welds = bool(read & set(self.welds.rows))
 
     def _rows_of(self, constraint: int) -> range:
         """Rows of a constraint by its number."""
@@ -175,6 +185,16 @@ class Model:
                 f"system '{self.system.name}': '{name}' is no input. Declared: {choices(self.layout.input_index)}."
             )
         return self.layout.input_index[name]
+
+    def open_call(self, q: np.ndarray, v: np.ndarray, t: float = 0.0, constraints_only: bool = False) -> Call | None:
+        """The first element whose equations, or their derivatives, are not finite at q, v, shape (n_q,); else None."""
+        w = self.new_work()
+        w.q[: self.n_q], w.v[: self.n_q] = q, v
+        packed, dynamics = Packed(w), self._dynamics.values
+        if constraints_only:
+            dynamics = dynamics._replace(kernel=dynamics.kernel[:0])
+        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
+        return open_call(self.layout, Packed(dynamics).table, self._constraints.table, packed.table)
 
     def constraint_jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[np.ndarray, ...]:
         """(phi, phi_q v + phi_t, phi_q, (phi_q v)_q) at q, v: shapes (n_phi,), (n_phi,), (n_phi, n_q) twice."""

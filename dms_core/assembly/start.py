@@ -92,7 +92,7 @@ def _closed(layout: Layout, jacobian: Jacobian, q: np.ndarray, name: str) -> np.
         else:
             break
         q, phi, G, size = trial, phi_t, G_t, np.abs(phi_t).max()
-    if size > ACCEPTED:
+    if not size <= ACCEPTED:
         row, gap = _widest_gap(layout, jacobian, q)
         open_drivers = _driver_rows(layout) & (np.abs(phi) > 0.1 * size)
         if np.count_nonzero(open_drivers) > 1:

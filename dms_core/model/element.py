@@ -48,15 +48,16 @@ coordinates q and inputs u (k, 3) of its first placement at the start.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numba import float64, int32, int64, types
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dms_core.errors import DmsError, ModelError
-from dms_core.validation import Checked
+from dms_core.validation import Checked, check_sizes
 
 _I = types.Array(int32, 1, "C")
 _A = types.Array(float64, 1, "C")
@@ -89,6 +90,27 @@ class Coordinate(NamedTuple):
     differential_rate: bool = True
     """True when vdot appears in the element's row (a second-order coordinate); False when the row fixes v
     itself (a first-order state: fibre length, activation), which then is an algebraic variable."""
+    least: float = -math.inf
+    """Value below which no solution is: dense output, which is rougher than the steps, is not let below it."""
+
+
+class Limit(NamedTuple):
+    """A range outside which an element's equations say something else than what it stands for.
+
+    The solution is computed there too, and the result of a run says when and how far the range was left.
+    """
+
+    of: Literal["coordinate", "multiplier", "input"]
+    name: str
+    """Full name of the coordinate, constraint row or input."""
+    unit: str
+    low: float = -math.inf
+    high: float = math.inf
+    below: str = ""
+    """What is so below `low`: a clause whose subject is the element."""
+    above: str = ""
+    share: float = 0.0
+    """How far outside counts as rounding, over the largest size of the value in the run."""
 
 
 class Compositions(NamedTuple):
@@ -159,6 +181,15 @@ class Declaration(Checked):
     wrong: ClassVar[type[DmsError]] = ModelError
     kind: ClassVar[str] = ""
     name: str = Field(min_length=1, description="unique name")
+
+    @model_validator(mode="after")
+    def _sizes(self):
+        check_sizes(self)
+        return self
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Ranges whose leaving the result of a run reports."""
+        return ()
 
 
 class DynamicElement(Declaration):

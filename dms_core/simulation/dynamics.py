@@ -7,16 +7,18 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dms_core.assembly.finite import FAR, far_numbers, open_call, sentence
 from dms_core.assembly.model import Model
-from dms_core.assembly.tables import with_settings
+from dms_core.assembly.tables import MODEL, Tables, with_settings
 from dms_core.compiled.arena import Packed, inner
 from dms_core.errors import InputError, ModelError, SimulationError
+from dms_core.flags import Flag, Limits
 from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.inspection import Inspection
-from dms_core.simulation.options import SolverOptions
+from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
@@ -24,6 +26,9 @@ from dms_core.simulation.step_control import OUTCOME
 
 BUFFER_ROWS = 256
 """Steps recorded between two returns to Python: short enough for a smooth progress bar."""
+
+WHOLE = 1e-6
+"""Share of a step by which rounding may shorten the last one of many."""
 
 RESULT_OF = {
     OUTCOME.done: Result.SUCCESS,
@@ -55,6 +60,7 @@ class World(Inspection):
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
+        self._singular = ""
 
     @property
     def tables(self) -> Packed:
@@ -102,7 +108,7 @@ class World(Inspection):
         Returns:
             SUCCESS, or what stopped the run: what was computed is kept and finite.
         """
-        if not math.isfinite(t_end) or t_end < self.time:
+        if not (t_end == 0.0 or is_positive(t_end)) or t_end < self.time:
             raise InputError(f"t_end: Expected a time of at least the present {self.time:.6g} s, got {t_end} s.")
         try:
             code, stuck = self._advance(float(t_end), progress), -math.inf
@@ -135,7 +141,8 @@ class World(Inspection):
         s = self.state
         try:
             self._tables = self.model.reordered(s.q, s.v, self.time)
-        except ModelError:
+        except ModelError as error:
+            self._singular = str(error)
             return False
         self._world = with_tables(self._tables.values, s)
         self.state = self._world.values
@@ -167,11 +174,53 @@ class World(Inspection):
         )
         return y
 
+    def flags(self) -> tuple[Flag, ...]:
+        """Elements that are outside the range they are meant for at the present time, see `Trajectory.flags`."""
+        s, at = self.state, self.operating_point()
+        lam = self.model.unique_multipliers(s.q[None], at.lam[None])
+        return Limits(self.model).left(np.array([self.time]), s.q[None], lam, at.u[None, :, 0])
+
     def _shorten(self) -> bool:
         """A quarter of the step for a matrix that is singular far from the present state; False below the smallest."""
         clock = self.state.clock
         clock[CLOCK.h_wanted] *= 0.25
         return self.options.fixed_step is None and bool(clock[CLOCK.h_wanted] > self.options.h_min)
+
+    @property
+    def message(self) -> str:
+        """How the last call of `advance` ended, in sentences: where it went wrong, or which steps were shorter."""
+        message, asked, shortest = self.result.value, self.options.fixed_step, self.stats().smallest_step
+        if self.result is not Result.SUCCESS:
+            return f"{message} Stopped at t = {self.time:.6g} s.{self._culprit()}"
+        if asked and 0.0 < shortest < asked * (1.0 - WHOLE):
+            message += (
+                f" Steps of {asked:.6g} s; the shortest, which ends on a jump of an input or on an end time that is no "
+                f"multiple of that, is {shortest:.6g} s."
+            )
+        return message
+
+    def _culprit(self) -> str:
+        """Where the last attempt at a step failed, as a sentence with a space before it; empty where nothing did."""
+        if self.result in (Result.SUCCESS, Result.INTERRUPTED):
+            return ""
+        table = self._tables.table
+        dynamics, constraints = inner(table, MODEL.dynamics), inner(table, MODEL.constraints)
+        far = far_numbers(self.model.system) + self._far_inputs()
+        call = open_call(self.model.layout, dynamics, constraints, inner(self._world.table, STATE.w))
+        if call is not None:
+            return f" {sentence(self.model.layout, call)}"
+        if self.result is Result.MATRIX_SINGULAR and self._singular:
+            return f" There {self._singular}{far}"
+        name = widest_coordinate(self.model, self._tables.values, self.state, self.result is Result.RATES_FAILED)
+        kind = self.model.system.element(name.rpartition(".")[0]).kind
+        where = "Steps are held small first by" if self.result is Result.TOO_MANY_STEPS else "It goes wrong first at"
+        return f" {where} '{name}' ({kind}).{far}"
+
+    def _far_inputs(self) -> str:
+        """The inputs that were set so far from 1 that they may be why a run failed; as `far_numbers`."""
+        values = zip(self.model.layout.input_index, self.state.w.u[:, 0], strict=True)
+        far = [f"'{name}' = {x}" for name, x in values if abs(x) > 10.0**FAR]
+        return f" Look at inputs far from 1 in SI units: {', '.join(far)}." if far else ""
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
@@ -189,6 +238,17 @@ class World(Inspection):
             smallest_step=float(x[LARGEST.h_least]) if c[COUNTS.steps] else 0.0,
             largest_step=float(x[LARGEST.h_most]),
         )
+
+
+def widest_coordinate(model: Model, tables: Tables, state: State, rates: bool) -> str:
+    """Name of the coordinate that the last attempt changed most, over its tolerance, or over its size for rates."""
+    free = tables.free
+    if rates:
+        change = np.abs(state.rate_x[: len(free)]) / tables.scale_v[free]
+    else:
+        change = np.abs(state.w.q[free] - state.q_guess[free]) / state.wq[free]
+    change[~np.isfinite(change)] = np.inf
+    return model.layout.names[free[int(np.argmax(change))]]
 
 
 class Simulation(World):
@@ -231,12 +291,9 @@ class Simulation(World):
     def trajectory(self) -> Trajectory:
         """Everything computed so far."""
         if not self._rows or not sum(len(r) for r in self._rows):
-            raise SimulationError(f"nothing was computed: {self.result.value}")
-        message = self.result.value
-        if self.result is not Result.SUCCESS:
-            message = f"{message} Stopped at t = {self.time:.6g} s."
+            raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
-        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), message)
+        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message)
 
 
 def simulate(
@@ -252,10 +309,15 @@ def simulate(
         >>> trajectory.at([0.5, 1.0]).coordinate("rod.x")
 
     Raises:
-        InputError: t_end is not positive, or an option is out of range.
+        InputError: t_end is not positive, an option is out of range, or the fixed step is longer than the run.
     """
-    if not (math.isfinite(t_end) and t_end > 0.0):
+    if not is_positive(t_end):
         raise InputError(f"t_end: Expected a positive time, got {t_end} s.")
+    if options is not None and options.fixed_step is not None and options.fixed_step > t_end:
+        raise InputError(
+            f"solver option fixed_step: Expected at most t_end = {t_end} s, got {options.fixed_step} s: a run of one "
+            "step, cut short, would say nothing about the step that was asked for."
+        )
     simulation = Simulation(model, options)
     simulation.advance(t_end, progress)
     return simulation.trajectory()

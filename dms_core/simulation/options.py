@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from numbers import Real
+from typing import Any, Literal
 
 from dms_core.errors import InputError
 from dms_core.simulation.state import Options
+
+MOST_STEPS = 2**62
+"""Counts are whole numbers of 64 bits."""
+
+
+def is_positive(value: Any) -> bool:
+    """True for a finite number above 0, of Python or NumPy."""
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    return number and bool(math.isfinite(value) and value > 0)
 
 
 @dataclass(frozen=True)
@@ -19,7 +29,7 @@ class SolverOptions:
     atol: float | None = None
     """Absolute tolerance of every variable in its own unit; None takes rtol times each variable's nominal size."""
     fixed_step: float | None = None
-    """Constant step [s]; None for error control."""
+    """Constant step [s], but for shorter ones that end on a jump of an input or on the end; None: error control."""
     h_max: float = 0.1
     """Largest step [s]."""
     h_min: float = 1e-12
@@ -34,14 +44,20 @@ class SolverOptions:
     """'sdirk2' needs no past: quicker where inputs jump every few steps, slower in smooth motion."""
 
     def __post_init__(self) -> None:
-        for name in ("rtol", "h_max", "h_min", "newton_tol", "constraint_tol", "max_steps"):
+        for name in ("rtol", "h_max", "h_min", "newton_tol", "constraint_tol"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
+            if not is_positive(value):
                 raise InputError(f"solver option {name}: Expected a positive number, got {value!r}.")
         for name in ("atol", "fixed_step"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
+            if value is not None and not is_positive(value):
                 raise InputError(f"solver option {name}: Expected a positive number or None, got {value!r}.")
+        if not (is_positive(self.max_steps) and self.max_steps == int(self.max_steps) <= MOST_STEPS):
+            raise InputError(
+                f"solver option max_steps: Expected a positive whole number up to {MOST_STEPS}, got {self.max_steps!r}."
+            )
+        if self.h_min > self.h_max:
+            raise InputError(f"solver option h_min: Expected at most h_max = {self.h_max} s, got {self.h_min} s.")
         if self.method not in ("bdf2", "sdirk2"):
             raise InputError(f"solver option method: Expected 'bdf2' or 'sdirk2', got {self.method!r}.")
 

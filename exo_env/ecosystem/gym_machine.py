@@ -1,6 +1,7 @@
 """The gym equipment (paper sect. 4.1): handle in the hand, rope of fixed length over two pulleys, sliding weight.
 
-The rope holds both ways in the equations; its tension is reported, and a negative one means a slack rope.
+The rope holds both ways in the equations; its tension is reported, and a negative one, which a run flags, means a slack
+rope.
 """
 
 from __future__ import annotations

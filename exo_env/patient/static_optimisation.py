@@ -13,7 +13,14 @@ import numpy as np
 
 from dms_core.model.geometry.rotations import add, cross, dot, sub, turned, vec
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.model.muscles.muscle import MUSCLE, fibre_at_rest, fibre_state, pennation_cosine, tendon_state
+from dms_core.model.muscles.fibre import (
+    MUSCLE,
+    fibre_at_rest,
+    fibre_state,
+    pennation_cosine,
+    smallest_fibre,
+    tendon_state,
+)
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
 from exo_env.jit import compiled
 
@@ -98,7 +105,7 @@ def path_at(arm, muscle, c, s):
 
 @compiled
 def muscle_moment(arm, angle, activations):
-    """Moment that muscles at rest give about the elbow [Nm]; they do not exist where a tendon leaves no room."""
+    """Moment that muscles at rest give about the elbow [Nm]; a fibre on its stop leaves its tendon slack."""
     found = 0.0
     for i in range(arm.muscles.shape[0]):
         par = arm.muscles[i]
@@ -206,7 +213,7 @@ def forces(arm, interval, lengths, tendon_force, activations, fibre, full, passi
         par = arm.muscles[i]
         for k in range(n):
             along = max(lengths[k, i] - tendon_length(par, tendon_force[k, i]), 1e-3 * par[MUSCLE.L0])
-            fibre[k] = math.hypot(along, par[MUSCLE.height])
+            fibre[k] = max(math.hypot(along, par[MUSCLE.height]), smallest_fibre(par))
         for k in range(n):
             here, there = min(k + 1, last), max(k - 1, 0)
             velocity = (fibre[here] - fibre[there]) / ((here - there) * interval)

@@ -10,7 +10,7 @@ import math
 
 from dms_core.kernels import floats, inner, ints, matrix
 from dms_core.model.geometry.rotations import add, cross, dot, rotated, sub, turned, vec
-from dms_core.model.muscles.muscle import fibre_at_rest
+from dms_core.model.muscles.fibre import fibre_at_rest
 from exo_env.ecosystem.gym_machine import handle_angle
 from exo_env.jit import compiled
 from exo_env.patient.static_optimisation import path_geometry

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from dms_core import InputError, Model, ModelError, SolverOptions, System, simulate
+from dms_core import InputError, Model, ModelError, Simulation, SolverOptions, System, simulate
 from dms_core.errors import AssemblyError
 from dms_core.model import (
     AngleDriver,
@@ -272,6 +272,39 @@ class TestOptions:
     def test_out_of_range(self, option, value):
         with pytest.raises(InputError, match=rf"solver option {option}: Expected a positive number.*, got {value!r}"):
             SolverOptions(**{option: value})
+
+    @pytest.mark.parametrize("value", [0, -1, 0.5, 1.5, math.nan, math.inf, 1e300, True])
+    def test_numbers_of_steps(self, value):
+        with pytest.raises(InputError, match=r"solver option max_steps: Expected a positive whole number"):
+            SolverOptions(max_steps=value)
+
+    def test_the_smallest_step_is_not_above_the_largest(self):
+        with pytest.raises(InputError, match=r"solver option h_min: Expected at most h_max = 0.01 s, got 0.1 s"):
+            SolverOptions(h_min=0.1, h_max=0.01)
+
+    def test_a_step_longer_than_the_run(self):
+        with pytest.raises(InputError, match=r"fixed_step: Expected at most t_end = 1.0 s, got 5.0 s"):
+            simulate(System(bodies=[rod()]), 1.0, SolverOptions(fixed_step=5.0))
+
+    def test_an_end_that_is_no_multiple_of_the_step_is_said(self):
+        run = simulate(System(bodies=[rod()]), 1.0, SolverOptions(fixed_step=0.3))
+        assert "Steps of 0.3 s; the shortest, which ends on a jump of an input or on an end time" in run.message
+        assert "is 0.1 s" in run.message
+        whole = simulate(System(bodies=[rod()]), 1.0, SolverOptions(fixed_step=0.1))
+        assert whole.message == whole.result.value
+
+    @pytest.mark.parametrize("t", [-1.0, 0.05, math.nan, math.inf])
+    def test_an_end_before_the_present(self, t):
+        simulation = Simulation(System(bodies=[rod()]))
+        simulation.advance(0.1)
+        with pytest.raises(InputError, match=r"t_end: Expected a time of at least the present 0.1 s"):
+            simulation.advance(t)
+
+    @pytest.mark.parametrize("sample", [0.0, -1.0, math.nan, math.inf])
+    def test_times_between_rows(self, sample):
+        run = simulate(System(bodies=[rod()]), 0.1)
+        with pytest.raises(InputError, match=r"sample: Expected a positive time"):
+            run.grid(sample)
 
     @pytest.mark.parametrize("t_end", [0.0, -1.0, math.nan])
     def test_end_time(self, t_end):

@@ -90,6 +90,19 @@ def steep_pennation() -> Example:
     return _example(muscle, **_moving(muscle, (0.5, 0.9), (-0.2, -0.02)))
 
 
+def on_the_stop() -> Example:
+    """A fibre within the stop, 0.01 to 0.0101 L0, and beyond it: to the left of its kink; tendon slack."""
+    muscle = _muscle(slack=50.0, pennation=0.0)
+    return _example(muscle, **_moving(muscle, (0.0090, 0.01006), (-0.2, -0.02)))
+
+
+def on_the_stop_by_pennation() -> Example:
+    """As above where the steepest pennation asks for a longer fibre, at the height of the fibre and below."""
+    muscle = _muscle(slack=50.0)
+    least = muscle.smallest_fibre_length / L0
+    return _example(muscle, **_moving(muscle, (0.99 * least, 0.9999 * least), (-0.2, -0.02)))
+
+
 def activation_given() -> Example:
     """The input is the activation, without a coordinate of its own."""
     muscle = _muscle(activation_dynamics=False)
@@ -143,6 +156,8 @@ EXAMPLES = {
         fast_shortening,
         fast_lengthening,
         steep_pennation,
+        on_the_stop,
+        on_the_stop_by_pennation,
         activation_given,
         reflex_rising,
         reflex_limited,

@@ -1,7 +1,7 @@
 """Rope of fixed or prescribed length along a path (paper eq. 11): l(q) - psi = 0. One row.
 
 The force on the bodies is -lam l_q^T: lam is the tension [N]. The equation holds both ways, so a negative tension
-means that a real rope would be slack.
+means that a real rope would be slack: the result of a run says when and how negative (`Trajectory.flags`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.element import Constraint, ConstraintPattern, Placement
+from dms_core.model.element import Constraint, ConstraintPattern, Limit, Placement
 from dms_core.model.geometry.path import (
     PathPoint,
     add_path_gradient,
@@ -22,6 +22,9 @@ from dms_core.model.geometry.path import (
     path_pattern,
     start_length,
 )
+
+NO_TENSION = 1e-6
+"""Tension [N], and share of the largest tension of a run, that counts as 0: what rounding leaves of a slack rope."""
 
 
 @compiled
@@ -57,6 +60,15 @@ class RopeLength(Constraint):
     def rows(self) -> tuple[str, ...]:
         """One."""
         return ("length",)
+
+    def limits(self) -> tuple[Limit, ...]:
+        """A rope cannot push."""
+        return (
+            Limit(
+                "multiplier", f"{self.name}.length", "N", low=-NO_TENSION, share=NO_TENSION,
+                below="its tension was negative, where a real rope would be slack",
+            ),
+        )  # fmt: skip
 
     def place(self, system) -> Placement:
         """Bodies at the ends of the segments that cross from one body to another."""

@@ -12,20 +12,21 @@ u is an input, or an input plus gain x, where x is a coordinate of another eleme
 
 The fibre's height L0 sin(alpha0) is constant; cos(alpha) is not let below 0.1. With the force-velocity curve inverted
 in closed form the fibre row holds q_m and its rate directly, without an inner iteration.
+
+A fibre has a smallest length, where a stop takes its force (fibre.py).
 """
 
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from dms_core.bracket import narrowed, trial
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.model.element import Coordinate, Force, Pattern, Placement
+from dms_core.model.element import Coordinate, Force, Limit, Pattern, Placement
 from dms_core.model.geometry.path import (
     PathPoint,
     PathTable,
@@ -36,65 +37,28 @@ from dms_core.model.geometry.path import (
     path_table,
 )
 from dms_core.model.muscles.activation import MINIMUM, activation_rate, limited
-from dms_core.model.muscles.thelen_curves import (
-    ThelenCurves,
-    active_force,
-    force_velocity,
-    passive_force,
-    tendon_force,
+from dms_core.model.muscles.fibre import (
+    LEAST_COSINE,
+    MUSCLE,
+    STOP_WIDTH,
+    fibre_at_rest,
+    fibre_state,
+    fibre_stop,
+    pennation_cosine,
+    smallest_fibre,
+    tendon_state,
 )
+from dms_core.model.muscles.thelen_curves import ThelenCurves
 from dms_core.model.places import numbers_at
 
-LEAST_COSINE = 0.1
-"""Pennation is not let beyond acos(0.1), about 84 degrees."""
-MOST_TRIALS = 200
-"""Evaluations after which a search for a zero is as good as it gets."""
+MOST_PASSIVE = 1e3
+"""Passive force over F0 beyond which a fibre is not let start."""
 PATH_INTEGERS = 2
 """Index in `ip` where the path begins: before it, 1 for activation dynamics (2 with a reflex, 0 where the input is the
 activation), and the number m of body coordinates: q_m is local coordinate m, a is m + 1, a reflex m + 2."""
 
 
-class MuscleNumbers(NamedTuple):
-    """Places of the kernel's numbers; the path's table is the last of them."""
-
-    F0: int = 0
-    L0: int = 1
-    Ls: int = 2
-    height: int = 3
-    """Height of the fibre across the tendon, L0 sin(alpha0) [m]."""
-    fastest: int = 4
-    """Contraction velocity [m/s]."""
-    activation_time: int = 5
-    deactivation_time: int = 6
-    """Time constants [s]."""
-    active_shape: int = 7
-    passive_shape: int = 8
-    passive_strain: int = 9
-    toe_strain: int = 10
-    """Tendon strain at the end of the toe [-]."""
-    tendon_slope: int = 11
-    """Slope of the tendon's line behind the toe [-]."""
-    velocity_shape: int = 12
-    lengthening_force: int = 13
-    reflex_gain: int = 14
-    """0 without a reflex."""
-    path: int = 15
-
-
-MUSCLE = MuscleNumbers()
 PATH_NUMBERS = MUSCLE.path
-
-
-@compiled
-def pennation_cosine(par, length):
-    """(cos(alpha), its slope by the fibre length [1/m])."""
-    height = par[MUSCLE.height]
-    if length <= height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE):
-        # A fibre without height is parallel to the tendon at every length, even where Newton's method tries l <= 0.
-        return (LEAST_COSINE, 0.0) if height > 0.0 else (1.0, 0.0)
-    s = height / length
-    c = math.sqrt(1.0 - s * s)
-    return c, s * s / (length * c)
 
 
 @compiled
@@ -115,60 +79,6 @@ def muscle_excitation(ip, par, q, u):
 
 
 @compiled
-def tendon_state(par, length, fibre):
-    """(sigma [N], dsigma/dl [N/m], dsigma/dq_m [N/m]) at the given muscle-tendon and fibre lengths."""
-    c, c_l = pennation_cosine(par, fibre)
-    F0, Ls = par[MUSCLE.F0], par[MUSCLE.Ls]
-    ft, ft_e = tendon_force((length - fibre * c) / Ls - 1.0, par[MUSCLE.toe_strain], par[MUSCLE.tendon_slope])
-    by_length = F0 * ft_e / Ls
-    return F0 * ft, by_length, -by_length * (c + fibre * c_l)
-
-
-@compiled
-def fibre_state(par, fibre, rate, a):
-    """Active and passive fibre force [N]; derivatives of the active by q_m, its rate and a, of the passive by q_m."""
-    F0, L0, fastest = par[MUSCLE.F0], par[MUSCLE.L0], par[MUSCLE.fastest]
-    fl, fl_l = active_force(fibre / L0, par[MUSCLE.active_shape])
-    fp, fp_l = passive_force(fibre / L0, par[MUSCLE.passive_shape], par[MUSCLE.passive_strain])
-    fv, fv_w, fv_a = force_velocity(rate / fastest, a, par[MUSCLE.velocity_shape], par[MUSCLE.lengthening_force])
-    return (
-        F0 * a * fl * fv,
-        F0 * fp,
-        F0 * a * fl_l * fv / L0,
-        F0 * a * fl * fv_w / fastest,
-        F0 * fl * (fv + a * fv_a),
-        F0 * fp_l / L0,
-    )
-
-
-@compiled
-def surplus(par, length, fibre, a):
-    """Force of a fibre at rest along the tendon, less that of the tendon [N]."""
-    active, passive = fibre_state(par, fibre, 0.0, a)[:2]
-    return (active + passive) * pennation_cosine(par, fibre)[0] - tendon_state(par, length, fibre)[0]
-
-
-@compiled
-def fibre_at_rest(par, length, a):
-    """Fibre length [m] at which `surplus` is 0, to rounding; 0.0 where the tendon leaves no room for it."""
-    height, room = par[MUSCLE.height], length - par[MUSCLE.Ls]
-    low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[MUSCLE.L0]) * (1.0 + 1e-12)
-    # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
-    high = math.hypot(max(room, 0.0), height)
-    if room <= 0.0 or high <= low:
-        return 0.0
-    f_low, f_high, moved = surplus(par, length, low, a), surplus(par, length, high, a), 0.0
-    if f_low >= 0.0:
-        return 0.0
-    for _ in range(MOST_TRIALS):
-        x = trial(low, f_low, high, f_high)
-        if not low < x < high:
-            break
-        low, f_low, high, f_high, moved = narrowed(low, f_low, high, f_high, moved, x, surplus(par, length, x, a))
-    return low if -f_low < f_high else high
-
-
-@compiled
 def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip as described at PATH_INTEGERS, par as in MuscleNumbers."""
     m = ip[1]
@@ -177,6 +87,7 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     sigma, s_l, s_m = tendon_state(par, length, q[m])
     active, passive, by_l, by_v, by_a, passive_l = fibre_state(par, q[m], v[m], act)
     c, c_l = pennation_cosine(par, q[m])
+    stop, stop_l = fibre_stop(par, q[m])
     if level > 0:
         add_path_hessian(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, sigma, Jq)
         for i in range(m):
@@ -185,12 +96,16 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
             Jq[i, m] = s_m * r[i]
             Jq[m, i] = -s_l * r[i]
         Jq[m, m] = (by_l + passive_l) * c + (active + passive) * c_l - s_m
+        if stop > 0.0:
+            Jq[m, m] -= stop_l
         Jv[m, m] = by_v * c
         if ip[0] > 0:
             Jq[m, m + 1] = by_a * c
     for i in range(m):
         r[i] *= sigma
     r[m] = (active + passive) * c - sigma
+    if stop > 0.0:
+        r[m] -= stop
     if ip[0] > 0:
         excitation, by_reflex = muscle_excitation(ip, par, q, u)
         rate, rate_a, rate_u = activation_rate(
@@ -275,16 +190,53 @@ class ThelenMuscle(Force):
             raise ValueError(f"reflex '{self.reflex}' acts on the excitation; it needs activation_dynamics: true")
         return self
 
+    @model_validator(mode="after")
+    def _start_possible(self):
+        start = self.start_fibre_length
+        if start is not None and not self.smallest_fibre_length <= start <= self.longest_start:
+            raise ValueError(
+                f"start_fibre_length = {start}: Expected a number from {self.smallest_fibre_length:.4g} m, the "
+                f"smallest length, to {self.longest_start:.4g} m, where the passive force is {MOST_PASSIVE:g} F0"
+            )
+        return self
+
     def coordinates(self) -> tuple[Coordinate, ...]:
         """First-order states; the fibre length is a guess that `start_states` replaces."""
         L0, fastest = self.optimal_fibre_length, self.optimal_fibre_length * self.max_contraction_velocity
+        least = self.smallest_fibre_length
         fibre = Coordinate(
-            "fibre_length", self.start_fibre_length or L0, scale=L0, rate_scale=fastest, differential_rate=False
-        )
+            "fibre_length", self.start_fibre_length or L0, scale=L0, rate_scale=fastest, differential_rate=False,
+            least=least,
+        )  # fmt: skip
         if not self.activation_dynamics:
             return (fibre,)
         quickest = 1.0 / min(self.activation_time_constant, self.deactivation_time_constant)
         return (fibre, Coordinate("activation", self.start_activation, rate_scale=quickest, differential_rate=False))
+
+    @property
+    def smallest_fibre_length(self) -> float:
+        """q_min [m]: no fibre shortens below it."""
+        return float(smallest_fibre(np.array(self.numbers())))
+
+    @property
+    def longest_start(self) -> float:
+        """Fibre length [m] at which the passive force is MOST_PASSIVE times F0."""
+        k = self.curves.passive_shape
+        # log(1 + M (exp(k) - 1)), which does not overflow.
+        exponent = k + math.log(MOST_PASSIVE + (1.0 - MOST_PASSIVE) * math.exp(-k))
+        return self.optimal_fibre_length * (1.0 + self.curves.passive_strain * exponent / k)
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Fibre between its stop and the strain at which the passive curve is F0, through which Thelen fits it."""
+        stop = self.smallest_fibre_length + STOP_WIDTH * self.optimal_fibre_length
+        return (
+            Limit(
+                "coordinate", f"{self.name}.fibre_length", "m", low=stop,
+                high=self.optimal_fibre_length * (1.0 + self.curves.passive_strain),
+                below=f"a stop held its fibre at the smallest length, {self.smallest_fibre_length:.4g} m",
+                above="its fibre was longer than (1 + passive_strain) L0, where the passive force is F0",
+            ),
+        )  # fmt: skip
 
     def input_names(self) -> tuple[str, ...]:
         """The excitation."""
@@ -345,7 +297,7 @@ class ThelenMuscle(Force):
         return tendon_state(np.array(self.numbers()), length_mt, fibre_length)[0]
 
     def equilibrium(self, length_mt: float, activation: float) -> float:
-        """Fibre length [m] at rest: F0 (a fl + fp) cos(alpha) = sigma.
+        """Fibre length [m] at rest under tension: F0 (a fl + fp) cos(alpha) = sigma; never below the smallest one.
 
         Args:
             length_mt: muscle-tendon length [m].
@@ -355,11 +307,12 @@ class ThelenMuscle(Force):
             ModelError: the tendon slack length leaves no room for the fibre within `length_mt`.
         """
         found = fibre_at_rest(np.array(self.numbers()), length_mt, activation)
-        if found == 0.0:
+        if self.tension(length_mt, found) <= 0.0:
             raise ModelError(
                 f"{self.kind} '{self.name}': its path is {length_mt:.6g} m long, the tendon slack length is "
                 f"{self.tendon_slack_length:.6g} m; that leaves no room for a fibre under tension. "
-                "Shorten the tendon slack length or move the path points apart."
+                "Shorten the tendon slack length or move the path points apart; to start with a slack tendon, give "
+                "start_fibre_length."
             )
         return float(found)
 

@@ -8,13 +8,17 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.element import Force, Pattern, Placement
+from dms_core.model.element import Force, Limit, Pattern, Placement
 from dms_core.model.geometry.path import PathPoint, add_path_gradient, add_path_hessian, moving_path, path_pattern
 
 CONSTANT, INPUT, COORDINATE = 0, 1, 2
 """Where the tension comes from: first integer of the table."""
 PATH_INTEGERS, PATH_NUMBERS = 2, 1
 """Indices in `ip` and `par` where the path begins."""
+NO_TENSION = 1e-6
+"""Tension that counts as 0 [N]."""
+UNDERSHOOT = 1e-3
+"""Share of a run's largest tension by which a coordinate may fall below 0: the error of its equation."""
 
 
 @compiled
@@ -77,6 +81,16 @@ class RopeForce(Force):
     def input_names(self) -> tuple[str, ...]:
         """The tension, where it is an input."""
         return () if self.input is None else (self.input,)
+
+    def limits(self) -> tuple[Limit, ...]:
+        """A rope cannot push: a negative input counts as 0, a coordinate is taken as it is."""
+        if self.input is not None:
+            said = f"its tension, input '{self.input}', was negative; it pulled nothing, as a rope cannot push"
+            return (Limit("input", self.input, "N", low=-NO_TENSION, below=said),)
+        if self.coordinate is not None:
+            said = f"its tension, coordinate '{self.coordinate}', was negative; it pushed, which no rope can"
+            return (Limit("coordinate", self.coordinate, "N", low=-NO_TENSION, below=said, share=UNDERSHOOT),)
+        return ()
 
     def place(self, system) -> Placement:
         """Bodies at the ends of the crossing segments, then the coordinate that is the tension."""

@@ -124,6 +124,12 @@ class TestRun:
             ("--t-end", "inf", "--t-end: Expected a positive time [s], got inf"),
             ("--sample", -0.1, "--sample: Expected a positive time [s], got -0.1"),
             ("--step", 0, "--step: Expected a positive number, got 0.0"),
+            ("--step", -1, "--step: Expected a positive number, got -1.0"),
+            ("--step", "nan", "--step: Expected a positive number, got nan"),
+            ("--step", 5, "--step: Expected at most --t-end = 0.1 s, got 5.0 s"),
+            ("--sample", 5, "--sample: Expected at most --t-end = 0.1 s, got 5.0 s"),
+            ("--sample", "nan", "--sample: Expected a positive time [s], got nan"),
+            ("--t-end", -1, "--t-end: Expected a positive time [s], got -1.0"),
         ],
     )
     def test_numbers_out_of_range(self, command, tmp_path, option, value, message):

@@ -6,6 +6,7 @@ import pytest
 from dms_core.errors import ModelError
 from dms_core.model.element import GROUND
 from dms_core.model.geometry.path import PathPoint, path_length
+from dms_core.model.muscles.fibre import STOP_WIDTH, fibre_at_rest, fibre_stop, surplus
 from dms_core.model.muscles.muscle import PATH_INTEGERS, PATH_NUMBERS, pennation_cosine, thelen_muscle
 from tests.arm26 import MUSCLES, arm, body_coordinates, muscle, table
 
@@ -132,6 +133,22 @@ def test_equilibrium_exists_over_the_whole_range(name, activation):
     for share in (0.2, 0.5, 1.0, 1.6, 3.0):
         fibre = m.equilibrium(m.tendon_slack_length + share * m.optimal_fibre_length, activation)
         assert 0.0 < fibre * pennation_cosine(par, fibre)[0] < share * m.optimal_fibre_length
+
+
+@pytest.mark.parametrize("length", [0.05, 0.2723, 0.2723 + 1e-4])
+def test_a_fibre_without_room_rests_on_its_stop(length):
+    m = muscle("BIClong")
+    par = np.array(m.numbers())
+    fibre = fibre_at_rest(par, length, 0.5)
+    assert m.smallest_fibre_length < fibre < m.smallest_fibre_length + STOP_WIDTH * m.optimal_fibre_length
+    # The stop holds what the fibre pulls more than its tendon; 4 F0 over 1e-4 L0 is 2e8 N/m, and rounding 1e-18 m.
+    assert surplus(par, length, fibre, 0.5) == pytest.approx(fibre_stop(par, fibre)[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("start", [0.0, 1e-4, 10.0])
+def test_a_start_out_of_range_is_named_with_what_is_allowed(start):
+    with pytest.raises(ModelError, match=r"thelen_muscle 'BIClong': start_fibre_length = .*: Expected a number"):
+        muscle("BIClong", start_fibre_length=start)
 
 
 def test_steep_pennation_is_refused():

@@ -1,0 +1,165 @@
+"""What the result of a run flags: ropes that push, fibres at the ends of their range."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from dms_core import Result, SolverOptions, System, World, simulate
+from dms_core.model import (
+    Constant,
+    FirstOrder,
+    Harmonic,
+    Input,
+    LumpedLoad,
+    PathPoint,
+    PointMass,
+    RopeForce,
+    RopeLength,
+    ThelenMuscle,
+)
+
+BALL = PointMass(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
+PATH = PathPoint(point=(0.0, 0.0, 0.0)), PathPoint(body="ball", point=(0.0, 0.0, 0.0))
+
+
+def _pulled(signal) -> System:
+    """A ball on a rope of fixed length along x, pulled away from its anchor with u newtons."""
+    return System(
+        bodies=[BALL],
+        constraints=[RopeLength(name="cable", path=PATH)],
+        forces=[LumpedLoad(name="pull", body="ball", force=(1.0, 0.0, 0.0), input="u")],
+        inputs=[Input(name="u", signal=signal)],
+    )
+
+
+class TestRopes:
+    def test_a_rope_that_pushes_is_flagged_with_when_and_how_much(self):
+        run = simulate(_pulled(Constant(value=-10.0)), 0.5).check()
+        (flag,) = run.flags
+        assert (flag.element, flag.kind, flag.first, flag.unit) == ("cable", "rope_length", 0.0, "N")
+        assert flag.worst == pytest.approx(-10.0, rel=1e-9) and flag.total == pytest.approx(0.5, rel=1e-9)
+        assert run.result is Result.SUCCESS
+        assert run.message.startswith(Result.SUCCESS.value) and flag.sentence in run.message
+        assert "rope_length 'cable': its tension was negative" in flag.sentence
+
+    @pytest.mark.parametrize("pull", [10.0, 0.0])
+    def test_a_rope_that_pulls_or_hangs_is_not(self, pull):
+        run = simulate(_pulled(Constant(value=pull)), 0.5).check()
+        assert run.flags == () and run.message == Result.SUCCESS.value
+
+    def test_the_first_time_is_that_of_the_change_of_sign(self):
+        run = simulate(_pulled(Harmonic(amplitude=5.0, frequency=1.0)), 1.0, SolverOptions(h_max=0.01)).check()
+        (flag,) = run.flags
+        step = run.stats.largest_step
+        assert 0.5 <= flag.first <= 0.5 + step and flag.total == pytest.approx(0.5, abs=2.0 * step)
+        assert flag.worst == pytest.approx(-5.0, rel=1e-3) and flag.at == pytest.approx(0.75, abs=step)
+
+    def test_a_world_tells_of_the_present(self):
+        world = World(_pulled(Constant(value=1.0)))
+        world.settle()
+        assert world.flags() == ()
+        world.set_input("u", -3.0)
+        world.advance(0.1)
+        assert [f.worst for f in world.flags()] == [pytest.approx(-3.0, rel=1e-9)]
+
+    def test_a_negative_command_of_a_rope_force(self):
+        rope = RopeForce(name="rope", path=PATH, input="u")
+        system = System(bodies=[BALL], forces=[rope], inputs=[Input(name="u", signal=Constant(value=-2.0))])
+        run = simulate(system, 0.1).check()
+        assert [(f.element, f.worst) for f in run.flags] == [("rope", -2.0)]
+        assert np.all(run.own_steps().rate("ball.x") == 0.0)  # it pulled nothing
+
+    def test_a_coordinate_that_pushes_through_a_rope(self):
+        lag = FirstOrder(name="motor", time_constant=0.01, input="u", scale=10.0)
+        rope = RopeForce(name="rope", path=PATH, coordinate="motor.x")
+        system = System(bodies=[BALL], forces=[lag, rope], inputs=[Input(name="u", signal=Constant(value=-2.0))])
+        (flag,) = simulate(system, 0.1).check().flags
+        assert flag.element == "rope" and "it pushed" in flag.sentence and flag.worst == pytest.approx(-2.0, rel=1e-3)
+
+
+def _muscle(**changes) -> System:
+    """A muscle between two fixed points, 0.3 m apart; its tendon is longer than that unless `changes` say so."""
+    facts = {
+        "name": "biceps",
+        "path": (PathPoint(point=(0.0, 0.0, 0.0)), PathPoint(point=(0.3, 0.0, 0.0))),
+        "excitation": "u",
+        "max_isometric_force": 600.0,
+        "optimal_fibre_length": 0.1,
+        "tendon_slack_length": 0.31,
+        "start_fibre_length": 0.05,
+    }
+    return System(
+        bodies=[BALL],
+        forces=[ThelenMuscle(**facts | changes)],
+        inputs=[Input(name="u", signal=Constant(value=0.5))],
+    )
+
+
+OPTIONS = {
+    "bdf2": SolverOptions(),
+    "loose": SolverOptions(rtol=1e-3),
+    "sdirk2": SolverOptions(method="sdirk2"),
+    "fixed": SolverOptions(fixed_step=1e-3),
+    "fixed sdirk2": SolverOptions(fixed_step=1e-3, method="sdirk2"),
+}
+
+
+SMALLEST = {
+    "straight": (0.0, 0.01 * 0.1),
+    "pennate": (0.3, 0.1 * np.sin(0.3) / np.sin(np.arccos(0.1))),
+}
+"""Pennation [rad] and OpenSim's smallest length [m] of a fibre of 0.1 m."""
+
+
+class TestFibres:
+    @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+    @pytest.mark.parametrize("dynamics", [True, False])
+    @pytest.mark.parametrize(("pennation", "least"), SMALLEST.values(), ids=SMALLEST)
+    def test_no_fibre_shortens_below_the_smallest_length(self, options, dynamics, pennation, least):
+        run = simulate(_muscle(pennation_angle=pennation, activation_dynamics=dynamics), 0.5, options).check()
+        fibre, name = run.own_steps().coordinate("biceps.fibre_length"), "biceps.fibre_length"
+        assert fibre.min() >= least * (1.0 - 1e-12)
+        assert run.at(np.linspace(0.0, 0.5, 2001)).coordinate(name).min() >= least * (1.0 - 1e-12)
+        # It rests there, within the stop's 1e-4 L0, without a rate: 1e-6 of the fastest one, 1 m/s.
+        assert least < fibre[-1] < least + 1e-5 and abs(run.own_steps().rate(name)[-1]) < 1e-6
+        (flag,) = run.flags
+        assert flag.element == "biceps" and "smallest length" in flag.sentence and flag.unit == "m"
+        # From 0.05 m, at 1 m/s at most.
+        assert 0.02 < flag.first < 0.5 and flag.total == pytest.approx(0.5 - flag.first, abs=2e-3)
+
+    def test_it_leaves_the_stop_when_the_tendon_pulls(self):
+        """The path grows from 0.3 to 0.36 m within a second: the tendon becomes taut and stretches the fibre again."""
+        ball = PointMass(name="ball", mass=1e6, position=(0.3, 0.0, 0.0), velocity=(0.06, 0.0, 0.0))
+        system = _muscle(path=PATH)
+        system = System(bodies=[ball], forces=system.forces, inputs=system.inputs)
+        run = simulate(system, 1.0).check()
+        fibre = run.own_steps().coordinate("biceps.fibre_length")
+        assert fibre.min() > 1e-3 and fibre[-1] > 0.03
+        (flag,) = run.flags
+        assert flag.first + flag.total < 0.9
+
+    def test_a_fibre_beyond_its_passive_curve(self):
+        """0.3 m less a tendon of 0.1 m: the fibre lengthens from 0.17 m until the tendon is slack at 0.2 m."""
+        (flag,) = simulate(_muscle(tendon_slack_length=0.1, start_fibre_length=0.17), 0.05).check().flags
+        assert "longer than (1 + passive_strain) L0" in flag.sentence and flag.first == 0.0
+        assert 0.17 <= flag.worst < 0.2
+
+    def test_a_slack_tendon_is_no_leaving(self):
+        run = simulate(_muscle(), 0.02).check()
+        assert run.flags == ()
+
+    def test_statistics_and_sentence_of_the_command(self, tmp_path, capsys):
+        from dms_core.__main__ import main
+        from dms_core.model_file import dump
+
+        model, stats = tmp_path / "m.yaml", tmp_path / "s.json"
+        model.write_text(dump(_muscle()))
+        arguments = ["run", str(model), "--t-end", "0.3", "--out", str(tmp_path / "x.csv"), "--stats", str(stats)]
+        assert main(arguments) == 0
+        written = json.loads(stats.read_text())
+        assert [f["element"] for f in written["flags"]] == ["biceps"]
+        assert written["flags"][0]["sentence"] in written["message"]
+        assert "thelen_muscle 'biceps': a stop held its fibre at the smallest length" in capsys.readouterr().out
