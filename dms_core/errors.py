@@ -33,9 +33,15 @@ class ModelWarning(UserWarning):
     """A model that can be run, but is hardly what its author meant."""
 
 
+MOST_NAMES = 60
+"""Names in a message; a file may hold any number of them."""
+
+
 def choices(names) -> str:
     """A readable list of what would have been right."""
     names = sorted(names)
+    if len(names) > MOST_NAMES:
+        return f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} others"
     return ", ".join(names) if names else "none are declared"
 
 

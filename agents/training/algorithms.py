@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import shown
 
 from .config import OURS, Config
 from .critic import TwoViewPolicy, seen_places
@@ -49,6 +50,10 @@ SMALL, NEARLY_ALL = 0.01, 0.99
 action at which a tanh is not yet so flat that nothing is learned."""
 SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
 """Arguments that lie from 0 to 1, and above 0."""
+COUNTS, MOST = ("n_steps", "batch_size", "n_epochs", "buffer_size", "lstm_hidden_size", "n_lstm_layers"), 10**9
+"""Arguments that are numbers of things, from 1 to MOST."""
+AUTO = re.compile(r"auto(?:_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)?")
+"""An entropy coefficient that is learned, from 1 or from this value."""
 
 
 def find(name: str) -> type[BaseAlgorithm]:
@@ -80,6 +85,7 @@ def arguments(config: Config) -> dict[str, Any]:
     _check_ranges(name, config.arguments)
     given = config.arguments.get("policy_kwargs", {})
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
+    _check_ranges(f"{name}: policy_kwargs", given)
     if squashed and start is None and "log_std_init" in given:
         raise InputError(f"{name}: policy_kwargs: log_std_init does nothing without training.start.")
     made = {k: _scheduled(v) for k, v in config.arguments.items()}
@@ -156,12 +162,12 @@ def _begin_at(policy: Any, action: torch.Tensor) -> None:
 def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str] = ()) -> None:
     """Refuses unknown keys and wrong types; `others`: keys that may stand beside these."""
     if not isinstance(given, Mapping):
-        raise InputError(f"{who} = {given!r}: expected a mapping.")
+        raise InputError(f"{who} = {shown(given)}: expected a mapping.")
     for key, value in given.items():
         if key not in known:
             raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices([*known, *others])}.")
         if key != "activation_fn" and not fits(value, known[key]):
-            raise InputError(f"{who}: {key} = {value!r}: expected {_in_words(known[key])}.")
+            raise InputError(f"{who}: {key} = {shown(value)}: expected {_in_words(known[key])}.")
 
 
 def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
@@ -169,9 +175,24 @@ def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
     for key, value in given.items():
         number = float(value.removeprefix("lin_")) if isinstance(value, str) and SCHEDULE.fullmatch(value) else value
         if key in SHARES and not 0.0 <= number <= 1.0:
-            raise InputError(f"{who}: {key} = {value!r}: expected a number from 0 to 1.")
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a number from 0 to 1.")
         if key in POSITIVE and not 0.0 < number < math.inf:
-            raise InputError(f"{who}: {key} = {value!r}: expected a positive number.")
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a positive number.")
+        if key in COUNTS and not 1 <= number <= MOST:
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a whole number from 1 to {MOST:g}.")
+        if key == "ent_coef" and isinstance(value, str) and not AUTO.fullmatch(value):
+            raise InputError(f"{who}: ent_coef = {shown(value)}: expected a number or text like auto_0.1.")
+        if not _finite(value):
+            raise InputError(f"{who}: {key} = {shown(value)}: expected finite numbers up to {MOST:g}.")
+
+
+def _finite(value: Any) -> bool:
+    """Whether all numbers in a value are of a size that something can be made of."""
+    if isinstance(value, Mapping):
+        return all(map(_finite, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_finite, value))
+    return not isinstance(value, int | float) or abs(value) <= MOST
 
 
 def fits(value: Any, hint: Any) -> bool:

@@ -168,12 +168,12 @@ MISTAKES = {
     "mapping for list": (ROD + "forces: {kind: gravity}\n", r"forces: Expected a list .*got \{'kind': 'gravity'\}"),
     "text for mapping": (ROD + "forces: [gravity]\n", r"'gravity' is not a mapping with the keys 'kind' and 'name'"),
     "number for name": ("name: 3\n" + ROD, r"name: Expected a text, got 3"),
-    "key twice": (ROD + "bodies: []\n", r"line 3, column 1 is not valid YAML: the key 'bodies' stands twice"),
+    "key twice": (ROD + "bodies: []\n", r"line 3, column 1: the key 'bodies' stands twice"),
     "broken YAML": ("bodies: [\n", r"line 2, column 1 is not valid YAML: while parsing a flow node"),
     "tab": ("bodies:\n\t- a\n", r"line 2, column 1 is not valid YAML: .*'\\t'"),
     "python object": (
         "bodies: !!python/object/apply:os.getcwd []\n",
-        r"line 1.* is not valid YAML: could not determine",
+        r"line 1, column 9: the tag '!!python/object/apply:os.getcwd' is not read",
     ),
     "empty": ("", r"holds nothing\. Expected a mapping"),
     "list": ("- a\n", r"holds a list\. Expected a mapping"),
@@ -196,12 +196,12 @@ def test_a_missing_file_is_named(tmp_path):
 def test_bytes_that_are_no_text_are_named(tmp_path):
     path = tmp_path / "binary.yaml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match=r"binary.yaml' cannot be read: it is not UTF-8 text"):
+    with pytest.raises(InputError, match=r"binary.yaml' cannot be read: it is UTF-16 text"):
         load(path)
 
 
 def test_scalars_are_read_as_written(model_file):
-    found = read_yaml(model_file("a: 1e-5\nb: -2.5E3\nc: no\nd: 0o17\ne: true\nf: 3\ng: .5\nh: 1.\ni: 1:30\n"))
+    found = read_yaml(model_file("a: 1e-5\nb: -2.5E3\nc: no\ne: true\nf: 3\ng: .5\nh: 1.\n"))
     numbers = {k: found[k] for k in "abegh"}
     assert numbers == {"a": 1e-5, "b": -2500.0, "e": True, "g": 0.5, "h": 1.0}
     assert found["c"] == "no" and found["f"] == 3 and isinstance(found["f"], int)

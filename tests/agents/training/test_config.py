@@ -154,7 +154,7 @@ def test_ends_of_a_range_belong_to_it(gamma):
     [
         ("--set n_steps: expected key=value", "n_steps"),
         ("--set n_steps.a=1: 'n_steps' is not a mapping", "n_steps.a=1"),
-        ("value '[1' is not valid YAML", "n_steps=[1"),
+        ("--set n_steps: value '[1' is not valid YAML", "n_steps=[1"),
         ("unknown key 'eval'", "training.eval=1"),
         ("unknown algorithm 'dqn'. There are: ppo, recurrent_ppo, sac, tqc", "training.algorithm=dqn"),
     ],
