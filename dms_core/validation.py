@@ -124,12 +124,19 @@ def shown(value: Any) -> str:
 
 
 def cut(text: str, most: int = LONGEST) -> str:
-    """A text, or its beginning where it is longer than `most` characters."""
+    """A text on one line, or its beginning where it is longer than `most` characters."""
+    text = _on_one_line(text[: most + 1])
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def _on_one_line(text: str) -> str:
+    """A text with escapes in place of line breaks and of all else that is not printed."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def _bounded(sentence: str) -> str:
     """A sentence, or both its ends: what is wrong stands at the beginning, what would be right at the end."""
+    sentence = "\n".join(map(_on_one_line, sentence.split("\n")))
     if len(sentence) <= LONGEST_SENTENCE:
         return sentence
     return f"{sentence[: LONGEST_SENTENCE // 2]} [...] {sentence[-LONGEST_SENTENCE // 2 :]}"

@@ -148,6 +148,8 @@ class Builder:
             raise refused(f"the key {shown(key)} is not text", event)
         if len(key) > LONGEST_KEY:
             raise refused(f"the key {shown(key)} has {len(key)} characters; expected at most {LONGEST_KEY}", event)
+        if not key.isprintable():
+            raise refused(f"the key {shown(key)} holds characters that are not printed", event)
         return key
 
     def _scalar(self, event: Any) -> Any:

@@ -63,7 +63,7 @@ def find(name: str) -> type[BaseAlgorithm]:
         InputError: there is none of this name; lists those there are.
     """
     if name not in ALGORITHMS:
-        raise InputError(f"unknown algorithm '{name}'. There are: {choices(ALGORITHMS)}.")
+        raise InputError(f"unknown algorithm {shown(name)}. There are: {choices(ALGORITHMS)}.")
     return ALGORITHMS[name]
 
 
@@ -75,7 +75,7 @@ def arguments(config: Config) -> dict[str, Any]:
     """
     name, algorithm = config.training.algorithm, find(config.training.algorithm)
     if config.policy not in policies(name):
-        raise InputError(f"policy = '{config.policy}'; {name} takes {choices(policies(name))}.")
+        raise InputError(f"policy = {shown(config.policy)}; {name} takes {choices(policies(name))}.")
     start, squashed = config.training.start, name in SQUASHED
     if start is not None and squashed and max(map(abs, start)) > NEARLY_ALL:
         raise InputError(f"training.start = {list(start)}; {name} takes from {-NEARLY_ALL} to {NEARLY_ALL}.")
@@ -114,7 +114,7 @@ def activation(name: str) -> type[nn.Module]:
     """
     key = str(name).rpartition(".")[2].lower().replace("_", "")
     if key not in ACTIVATIONS:
-        raise InputError(f"policy_kwargs: activation_fn = '{name}': expected one of {choices(ACTIVATIONS)}.")
+        raise InputError(f"policy_kwargs: activation_fn = {shown(str(name))}: expected one of {choices(ACTIVATIONS)}.")
     return ACTIVATIONS[key]
 
 

@@ -99,7 +99,7 @@ def _override(section: dict[str, Any], training: dict[str, Any], text: str) -> N
         place[part] = dict(place.get(part) or {}) if isinstance(place.get(part), Mapping | None) else None
         place = place[part]
         if place is None:
-            raise InputError(f"--set {cut(text)}: '{part}' is not a mapping.")
+            raise InputError(f"--set {cut(text)}: '{cut(part)}' is not a mapping.")
     try:
         new = read_value(value)
         place[path[-1]] = read_call(new) if path[-1] in MAPPINGS and isinstance(new, str) else new
