@@ -72,7 +72,7 @@ class Checked(BaseModel):
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler, /) -> CoreSchema:
         """Pydantic's schema of the class with strict numbers and truth values in it."""
-        return strict(handler(source), outermost=True)
+        return strict(handler(source), cls)
 
 
 def sentences(error: ValidationError, who: str, allowed: Any = ()) -> str:

@@ -14,7 +14,7 @@ import yaml
 from dms_core.validation import shown
 from dms_core.yaml_scalars import STANDARD, TAGS, UNPRINTABLE, OlderReader, plain_scalar, tagged_scalar
 
-MOST_VALUES = 200_000
+MOST_VALUES = 100_000
 """Most keys and values in a text, those that aliases stand for included."""
 MOST_DEPTH = 50
 """Most lists and mappings within each other."""
