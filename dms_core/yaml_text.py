@@ -20,11 +20,11 @@ import yaml
 from dms_core.errors import InputError
 from dms_core.input_file import MOST_BYTES, decoded, read_bytes
 from dms_core.validation import shown
-from dms_core.yaml_builder import Builder, Refused, Section, copied
+from dms_core.yaml_builder import FAST, Builder, Refused, Section, copied
 from dms_core.yaml_scalars import NUMBER, STANDARD, UNPRINTABLE
 
-MOST_PORTABLE = 200_000
-"""Largest file that is read by PyYAML's own scanner, as rl_zoo3 does [bytes]; it takes 3 s for a megabyte."""
+MOST_PORTABLE = 100_000
+"""Largest file that is read by PyYAML's own parser, as rl_zoo3 does [bytes]; it takes up to 10 s for a megabyte."""
 SHORT = 100_000
 """Longest text of which the content is kept [characters]."""
 
@@ -39,7 +39,8 @@ def read_yaml(path: str | Path, *, portable: bool = False) -> Section:
     Raises:
         InputError: the file cannot be read, is not YAML, or holds no mapping; names file and line.
     """
-    content = read_bytes(path, MOST_PORTABLE if portable else MOST_BYTES)
+    slow = portable or FAST is yaml.SafeLoader
+    content = read_bytes(path, MOST_PORTABLE if slow else MOST_BYTES)
     return parse_yaml(decoded(path, content), path, portable=portable)
 
 
