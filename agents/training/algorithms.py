@@ -12,7 +12,7 @@ import inspect
 import math
 import re
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Union, get_args, get_origin
 
 import torch
@@ -50,10 +50,19 @@ SMALL, NEARLY_ALL = 0.01, 0.99
 action at which a tanh is not yet so flat that nothing is learned."""
 SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
 """Arguments that lie from 0 to 1, and above 0."""
-COUNTS, MOST = ("n_steps", "batch_size", "n_epochs", "buffer_size", "lstm_hidden_size", "n_lstm_layers"), 10**9
-"""Arguments that are numbers of things, from 1 to MOST."""
-AUTO = re.compile(r"auto(?:_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)?")
-"""An entropy coefficient that is learned, from 1 or from this value."""
+MOST, UNITS = 10**9, (1, 10_000)
+"""Largest number of all, and how many units and parts a network may have."""
+COUNTS = {
+    "n_steps": (1, MOST), "batch_size": (1, MOST), "n_epochs": (1, MOST), "buffer_size": (1, MOST),
+    "learning_starts": (0, MOST), "net_arch": UNITS, "lstm_hidden_size": UNITS, "n_lstm_layers": UNITS,
+    "n_critics": UNITS, "n_quantiles": UNITS,
+}  # fmt: skip
+"""Least and largest of arguments that are numbers of things."""
+TEXTS = {
+    "ent_coef": re.compile(r"auto(?:_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)?"),
+    "target_entropy": re.compile("auto"),
+}
+"""What may stand in place of a number; an entropy coefficient is learned from a value on: auto_0.1."""
 
 
 def find(name: str) -> type[BaseAlgorithm]:
@@ -133,7 +142,7 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
         made = find(config.training.algorithm)(
             policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
         )
-    except (AssertionError, ValueError, TypeError, RuntimeError) as error:
+    except (AssertionError, ValueError, TypeError, RuntimeError, MemoryError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
     if config.training.start is not None:
@@ -178,21 +187,24 @@ def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
             raise InputError(f"{who}: {key} = {shown(value)}: expected a number from 0 to 1.")
         if key in POSITIVE and not 0.0 < number < math.inf:
             raise InputError(f"{who}: {key} = {shown(value)}: expected a positive number.")
-        if key in COUNTS and not 1 <= number <= MOST:
-            raise InputError(f"{who}: {key} = {shown(value)}: expected a whole number from 1 to {MOST:g}.")
-        if key == "ent_coef" and isinstance(value, str) and not AUTO.fullmatch(value):
-            raise InputError(f"{who}: ent_coef = {shown(value)}: expected a number or text like auto_0.1.")
-        if not _finite(value):
-            raise InputError(f"{who}: {key} = {shown(value)}: expected finite numbers up to {MOST:g}.")
+        if key in TEXTS and isinstance(value, str) and not TEXTS[key].fullmatch(value):
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a number or auto.")
+        if key == "policy_kwargs":
+            continue  # has ranges of its own
+        least, most = COUNTS.get(key, (-MOST, MOST))
+        if not all(least <= x <= most for x in _numbers(value)):
+            raise InputError(f"{who}: {key} = {shown(value)}: expected numbers from {least:g} to {most:g}.")
 
 
-def _finite(value: Any) -> bool:
-    """Whether all numbers in a value are of a size that something can be made of."""
+def _numbers(value: Any) -> Iterator[float]:
+    """All numbers in a value."""
     if isinstance(value, Mapping):
-        return all(map(_finite, value.values()))
+        value = list(value.values())
     if isinstance(value, list | tuple):
-        return all(map(_finite, value))
-    return not isinstance(value, int | float) or abs(value) <= MOST
+        for one in value:
+            yield from _numbers(one)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield value
 
 
 def fits(value: Any, hint: Any) -> bool:

@@ -4,6 +4,9 @@ A file has a section named after the environment, with the algorithm's arguments
 beside them n_envs, n_timesteps, policy, normalize, frame_stack and env_kwargs. A second section, `training`, which
 rl_zoo3 does not look at, says what it takes from its command line: how often to evaluate and to save.
 
+rl_zoo3 reads YAML 1.1, all else here is YAML 1.2; what the two read differently (010, 1e5 without a point and a sign,
+yes) is refused in such a file, with what to write instead (yaml_scalars.py).
+
 rl_zoo3 gives env_kwargs to the environments that it trains in, and none to those that it evaluates in. A section that
 it is to read therefore has them once more, as arguments of the wrapper SAME_SETTINGS, which it puts around both.
 """

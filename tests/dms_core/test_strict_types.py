@@ -128,3 +128,8 @@ def test_no_class_is_lax():
     classes = set(_classes(Checked))
     assert len(classes) > 80
     assert not {cls.__name__: found for cls in classes if (found := _lax(cls.__pydantic_core_schema__, cls))}
+
+
+def test_a_message_keeps_both_ends():
+    said = str(InputError("load = " + "x" * 100_000 + ": expected a number."))
+    assert len(said) < 4100 and said.startswith("load = x") and said.endswith("x: expected a number.")

@@ -35,8 +35,8 @@ from tests.fuzz.mutations import TOKENS, mutated
 INPUTS = 10_000 if os.environ.get("EXO_FUZZ") == "deep" else 300
 MOST_SECONDS = 2.0
 """Processor time of one input."""
-MOST_CHARACTERS = 15_000
-"""Of a message: eight sentences of at most 1500 characters, and the path in front of each."""
+MOST_CHARACTERS = 4100
+"""Of a message."""
 fuzzed = settings(
     max_examples=INPUTS, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
 )
