@@ -139,7 +139,7 @@ def dump(system: System) -> str:
         declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm)]
         if declared:
             content[section] = [_plain(e) for e in declared]
-    return write_yaml(content, default_flow_style=None)
+    return write_yaml(content, default_flow_style=None, allow_unicode=True)
 
 
 def _plain(value: Any) -> Any:

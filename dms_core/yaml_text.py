@@ -25,7 +25,7 @@ from dms_core.yaml_scalars import NUMBER, STANDARD, UNPRINTABLE
 
 MOST_PORTABLE = 100_000
 """Largest file that is read by PyYAML's own parser, as rl_zoo3 does [bytes]; it takes up to 10 s for a megabyte."""
-SHORT = 100_000
+SHORT = 20_000
 """Longest text of which the content is kept [characters]."""
 
 
@@ -83,7 +83,7 @@ def write_yaml(content: Any, file: IO[str] | None = None, **layout: Any) -> str:
     Returns:
         The text.
     """
-    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, width=120, allow_unicode=True, **layout)
+    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, width=120, **layout)
     if file is not None:
         file.write(text)
     return text
@@ -124,8 +124,8 @@ def _sentence(what: str, error: yaml.YAMLError, text: str, place: bool = True) -
     if isinstance(error, Refused):
         return f"{what}{where}: {'; '.join(parts)}."
     if mark and "cannot start any token" in parts[-1]:
-        line = re.split("\r\n|[\n\r\x85\u2028\u2029]", text)[mark.line]
-        character = line[mark.column : mark.column + 1]
+        lines = re.split("\r\n|[\n\r\x85\u2028\u2029]", text)
+        character = "".join(lines[mark.line : mark.line + 1])[mark.column : mark.column + 1]
         parts = ["a tab '\\t' stands where only spaces may" if character == "\t" else
                  f"no value begins with {character!r}; put it in quotes if it is text"]  # fmt: skip
     return f"{what}{where} is not valid YAML: {'; '.join(parts) or ' '.join(str(error).split())}."

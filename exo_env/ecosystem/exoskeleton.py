@@ -154,7 +154,7 @@ class Exoskeleton(Settings):
             >>> Exoskeleton.named("elbow").lifting_rope
             'agonist'
         """
-        if source.endswith((".yaml", ".yml")):
+        if isinstance(source, str) and source.endswith((".yaml", ".yml")):
             return cls.from_file(source)
         shipped = shipped_devices()
         if source not in shipped:

@@ -200,7 +200,7 @@ AnySubject = Annotated[
 
 def _is_file(source: str) -> bool:
     """Whether a subject is given by the path of a file, not by its name."""
-    return source.endswith((".yaml", ".yml"))
+    return isinstance(source, str) and source.endswith((".yaml", ".yml"))
 
 
 def _path(source: str) -> Path:
