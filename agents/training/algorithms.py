@@ -50,8 +50,8 @@ SMALL, NEARLY_ALL = 0.01, 0.99
 action at which a tanh is not yet so flat that nothing is learned."""
 SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
 """Arguments that lie from 0 to 1, and above 0."""
-MOST, UNITS = 10**9, (1, 10_000)
-"""Largest number of all, and how many units and parts a network may have."""
+LARGEST, MOST, UNITS = 1e30, 10**9, (1, 10_000)
+"""Size of a number, which PyTorch holds in 32 bits; most things; and how many units and parts a network may have."""
 COUNTS = {
     "n_steps": (1, MOST), "batch_size": (1, MOST), "n_epochs": (1, MOST), "buffer_size": (1, MOST),
     "learning_starts": (0, MOST), "net_arch": UNITS, "lstm_hidden_size": UNITS, "n_lstm_layers": UNITS,
@@ -191,7 +191,7 @@ def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
             raise InputError(f"{who}: {key} = {shown(value)}: expected a number or auto.")
         if key == "policy_kwargs":
             continue  # has ranges of its own
-        least, most = COUNTS.get(key, (-MOST, MOST))
+        least, most = COUNTS.get(key, (-LARGEST, LARGEST))
         if not all(least <= x <= most for x in _numbers(value)):
             raise InputError(f"{who}: {key} = {shown(value)}: expected numbers from {least:g} to {most:g}.")
 

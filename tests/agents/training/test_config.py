@@ -164,7 +164,7 @@ def test_mistakes_of_overrides_are_named(said, override):
     refused(said, overrides=[override])
 
 
-@pytest.mark.parametrize("value", [".inf", "-.inf", ".nan", "1e400", "1e30", "'1'", "true", "9" * 300, "[1]", "{a: 1}"])
+@pytest.mark.parametrize("value", [".inf", "-.inf", ".nan", "1e400", "1e31", "'1'", "true", "9" * 300, "[1]", "{a: 1}"])
 @pytest.mark.parametrize(
     "key",
     ["n_timesteps", "n_envs", "frame_stack", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda",
@@ -173,7 +173,7 @@ def test_mistakes_of_overrides_are_named(said, override):
      "training.eval_patients", "training.eval_seed", "training.threads", "training.hold"],
 )  # fmt: skip
 def test_numbers_that_are_none_are_refused_by_key(key, value):
-    if key.startswith("normalize") and not set(value) - set("1e309"):
+    if key.startswith("normalize") and not set(value) - set("1e319"):
         pytest.skip("a limit that is never reached")
     if (key, value) == ("policy_kwargs.net_arch", "[1]"):
         pytest.skip("a network of one unit")
@@ -187,7 +187,7 @@ def test_numbers_that_are_none_are_refused_by_key(key, value):
         ("n_envs = nan: expected a whole number from 1 to 10000", "n_envs=.nan"),
         ("ppo: n_steps = 0: expected numbers from 1 to 1e+09", "n_steps=0"),
         ("net_arch = [0]: expected numbers from 1 to 10000", "policy_kwargs.net_arch=[0]"),
-        ("ppo: max_grad_norm = inf: expected numbers from -1e+09 to 1e+09", "max_grad_norm=.inf"),
+        ("ppo: max_grad_norm = inf: expected numbers from -1e+30 to 1e+30", "max_grad_norm=.inf"),
         ("normalize: clip_obs = inf: expected a positive number", "normalize.clip_obs=.inf"),
         ("Training: eval_every = inf: Expected a finite number", "training.eval_every=.inf"),
         ("Training: traces.0 = nan: Expected a finite number", "training.traces=[.nan]"),
