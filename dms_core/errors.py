@@ -1,8 +1,16 @@
 """Errors of dms_core: what a user did wrong, which thing it was, and what would be right."""
 
+MOST_CHARACTERS = 4000
+"""Length of a message; what it quotes may be of any length."""
+
 
 class DmsError(Exception):
-    """Base of every error that dms_core raises on purpose."""
+    """Base of every error that dms_core raises on purpose. Of a long message both ends are kept."""
+
+    def __init__(self, message: str = "") -> None:
+        if len(message) > MOST_CHARACTERS:
+            message = f"{message[: MOST_CHARACTERS // 2]} [...] {message[-MOST_CHARACTERS // 2 :]}"
+        super().__init__(message)
 
 
 class ModelError(DmsError, ValueError):
@@ -33,9 +41,15 @@ class ModelWarning(UserWarning):
     """A model that can be run, but is hardly what its author meant."""
 
 
+MOST_NAMES = 60
+"""Names in a message; a file may hold any number of them."""
+
+
 def choices(names) -> str:
     """A readable list of what would have been right."""
     names = sorted(names)
+    if len(names) > MOST_NAMES:
+        return f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} others"
     return ", ".join(names) if names else "none are declared"
 
 

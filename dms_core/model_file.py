@@ -14,7 +14,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import BaseModel
 
 import dms_core.model  # noqa: F401  (makes every kind known)
@@ -24,7 +23,9 @@ from dms_core.model.constraints.euler_norm import EulerNorm
 from dms_core.model.element import Body, Constraint, Declaration, Force, Sensor
 from dms_core.model.signals import Function, Input
 from dms_core.model.system import System
-from dms_core.yaml_text import Section, read_yaml
+from dms_core.validation import cut, shown
+from dms_core.yaml_builder import Section
+from dms_core.yaml_text import read_yaml, write_yaml
 
 BRANCHES: dict[str, type[Declaration]] = {
     "bodies": Body,
@@ -73,7 +74,7 @@ def load(path: str | Path) -> System:
         raise ModelError(f"{path}: unknown key {_quoted(unknown)} at the top. Allowed: {allowed}.")
     name = content.get("name", Path(path).stem)
     if not isinstance(name, str):
-        raise ModelError(f"{path}: name: Expected a text, got {name!r}.")
+        raise ModelError(f"{path}: name: Expected a text, got {shown(name)}.")
     items = {section: _section(path, section, content.get(section)) for section in BRANCHES}
     lines = {declared.name: line for found in items.values() for declared, line in found}
     try:
@@ -99,25 +100,25 @@ def _section(path: str | Path, section: str, items: Any) -> list[tuple[Declarati
     if items is None:
         return []
     if not isinstance(items, list):
-        raise ModelError(f"{path}: {section}: Expected a list whose items begin with '- ', got {items!r}.")
+        raise ModelError(f"{path}: {section}: Expected a list whose items begin with '- ', got {shown(items)}.")
     return [(_declaration(path, section, item), getattr(item, "line", 0)) for item in items]
 
 
 def _declaration(path: str | Path, section: str, item: Any) -> Declaration:
     """One item of a section as the class that its kind names."""
     if not isinstance(item, Section):
-        raise ModelError(f"{path}: {section}: {item!r} is not a mapping with the keys 'kind' and 'name'.")
+        raise ModelError(f"{path}: {section}: {shown(item)} is not a mapping with the keys 'kind' and 'name'.")
     where, data = f"{path}, line {item.line}", dict(item)
-    who = f"'{data.get('name', '?')}' in {section}"
+    who = f"{cut(repr(str(data.get('name', '?'))))} in {section}"
     # Only one class may stand among the inputs.
     kind = data.pop("kind", "input" if section == "inputs" else None)
     allowed = kinds(section)
     if kind is None:
         raise ModelError(f"{where}: {who}: 'kind' is missing. Kinds of {section}: {choices(allowed)}.")
-    if kind not in allowed:
-        others = [s for s in BRANCHES if kind in kinds(s)]
+    if not isinstance(kind, str) or kind not in allowed:
+        others = [s for s in BRANCHES if kind in list(kinds(s))]
         hint = f" It belongs under '{others[0]}'." if others else ""
-        raise ModelError(f"{where}: {who}: unknown kind {kind!r}.{hint} Kinds of {section}: {choices(allowed)}.")
+        raise ModelError(f"{where}: {who}: unknown kind {shown(kind)}.{hint} Kinds of {section}: {choices(allowed)}.")
     try:
         declaration = allowed[kind](**data)
     except DmsError as error:
@@ -138,7 +139,7 @@ def dump(system: System) -> str:
         declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm)]
         if declared:
             content[section] = [_plain(e) for e in declared]
-    return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
+    return write_yaml(content, default_flow_style=None, allow_unicode=True)
 
 
 def _plain(value: Any) -> Any:
@@ -159,5 +160,5 @@ def _plain(value: Any) -> Any:
 
 
 def _quoted(names: Any) -> str:
-    """Names in quotes, sorted."""
-    return ", ".join(f"'{name}'" for name in sorted(names))
+    """The first names in quotes, sorted."""
+    return cut(", ".join(f"'{name}'" for name in sorted(names)))

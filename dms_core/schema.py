@@ -27,6 +27,10 @@ fixed frame. All numbers are in SI units (m, kg, s, N) and radians. Keys that ar
 default; a required key left out, a wrong type, and a key or kind that does not exist are errors that name file, line
 and element.
 
+Numbers are those of YAML 1.2: `010` is 10, `0o10` is 8, `1e5` is a number; `1:30`, `1_000`, `yes` and dates are text,
+and so is a number in quotes. A merge takes keys from another mapping, and those beside it come first:
+`{<<: *rod, name: rod2}`. A file has at most 4 MB and 100,000 keys and values, aliases written out.
+
 ```yaml
 name: pendulum
 bodies:

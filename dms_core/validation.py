@@ -12,9 +12,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from dms_core.errors import DmsError, InputError, choices
+from dms_core.strict_types import strict
 
 _EXPECTED: dict[str, str] = {
     "float_type": "a number",
@@ -22,6 +24,7 @@ _EXPECTED: dict[str, str] = {
     "int_type": "a whole number",
     "int_parsing": "a whole number",
     "int_from_float": "a whole number",
+    "int_parsing_size": "a whole number of fewer than 19 digits",
     "finite_number": "a finite number",
     "greater_than": "a number above {gt:g}",
     "greater_than_equal": "a number of at least {ge:g}",
@@ -44,22 +47,33 @@ _EXPECTED: dict[str, str] = {
 """What would have been right, by pydantic's type of error; the fields in braces are those of its context."""
 
 
+LONGEST, MOST_SENTENCES, LONGEST_SENTENCE = 70, 8, 1500
+"""Characters of a value in a message, sentences of a message, and characters of a sentence."""
+
+
 class Checked(BaseModel):
     """Base of everything that is checked: frozen, without unknown keys, without infinite numbers.
 
-    A wrong value raises `wrong`, with one sentence for each mistake.
+    A wrong value raises `wrong`, with one sentence for each mistake. Types are strict: a number in quotes is text, true
+    is no number and 1 is not true, in files and in Python. Numbers and arrays of NumPy are taken, and 5.0 where a whole
+    number is expected.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     wrong: ClassVar[type[DmsError]] = InputError
 
-    def __init__(self, **data: Any) -> None:
+    def __init__(self, /, **data: Any) -> None:
         try:
-            super().__init__(**data)
+            super().__init__(**plain(data))
         except ValidationError as error:
             label = getattr(type(self), "kind", "") or type(self).__name__
             who = f"{label} '{data.get('name', '?')}'" if "name" in type(self).model_fields else label
             raise self.wrong(sentences(error, who, type(self).model_fields)) from None
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler, /) -> CoreSchema:
+        """Pydantic's schema of the class with strict numbers and truth values in it."""
+        return strict(handler(source), cls)
 
 
 SMALLEST, LARGEST = 1e-30, 1e30
@@ -103,7 +117,11 @@ def sentences(error: ValidationError, who: str, allowed: Any = ()) -> str:
         if e["type"] == "missing" and e["loc"] and isinstance(e["loc"][-1], int):
             lengths[e["loc"][:-1]] = e["loc"][-1] + 1
     # Each missing item of a list is a mistake of its own to pydantic, but one to its author.
-    return "\n".join(dict.fromkeys(_sentence(dict(e), who, allowed, lengths) for e in found))
+    said = dict.fromkeys(_sentence(dict(e), cut(who), allowed, lengths) for e in found[:MOST_SENTENCES])
+    lines = [_bounded(line) for line in said]
+    if len(found) > MOST_SENTENCES:
+        lines.append(f"{cut(who)}: {len(found) - MOST_SENTENCES} further mistakes.")
+    return "\n".join(lines)
 
 
 def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping[tuple, int]) -> str:
@@ -115,7 +133,7 @@ def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping
         return f"{who}: unknown key '{key}'.{known}"
     if kind == "missing" and where[:-1] in lengths:
         key = ".".join(str(x) for x in where[:-1])
-        return f"{who}: {key} = {plain(value)!r}: Expected {lengths[where[:-1]]} items, got {len(value)}."
+        return f"{who}: {key} = {shown(value)}: Expected {lengths[where[:-1]]} items, got {len(value)}."
     if kind == "missing":
         return f"{who}: '{key}' is missing."
     if isinstance(error.get("ctx", {}).get("error"), DmsError):
@@ -123,7 +141,34 @@ def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping
         said = f"{error['msg'].removeprefix('Value error, ').rstrip('.')}."
         return f"{who}: {key}: {said}" if key else f"{who}: {said}"
     said = _right(kind, error.get("ctx", {}), error["msg"])
-    return f"{who}: {key} = {plain(value)!r}: {said}" if key else f"{who}: {said}"
+    return f"{who}: {key} = {shown(value)}: {said}" if key else f"{who}: {said}"
+
+
+def shown(value: Any) -> str:
+    """A value for a message, as Python writes it; only the beginning of a long one."""
+    try:
+        return cut(repr(plain(value)))
+    except ValueError:  # Python refuses to write a whole number of more than 4300 digits
+        return "a whole number of thousands of digits"
+
+
+def cut(text: str, most: int = LONGEST) -> str:
+    """A text on one line, or its beginning where it is longer than `most` characters."""
+    text = _on_one_line(text[: most + 1])
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def _on_one_line(text: str) -> str:
+    """A text with escapes in place of line breaks and of all else that is not printed."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def _bounded(sentence: str) -> str:
+    """A sentence, or both its ends: what is wrong stands at the beginning, what would be right at the end."""
+    sentence = "\n".join(map(_on_one_line, sentence.split("\n")))
+    if len(sentence) <= LONGEST_SENTENCE:
+        return sentence
+    return f"{sentence[: LONGEST_SENTENCE // 2]} [...] {sentence[-LONGEST_SENTENCE // 2 :]}"
 
 
 def plain(value: Any) -> Any:

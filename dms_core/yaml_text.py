@@ -1,90 +1,63 @@
 """Reading YAML so that a mistake can be shown by file and line.
 
-Safe loading (no objects are built), with three differences from `yaml.safe_load`, each because the usual rule hides
-a mistake: a key that stands twice is an error; `1e-5` is a number (YAML 1.2; YAML 1.1 reads it as text); `yes`, `on`
-and the like are text, only `true` and `false` are logical.
+All files are read alike: models, patients, devices, subjects, exercises, scenarios, and what stands behind `--set`.
+Numbers are those of YAML 1.2 (yaml_scalars.py). A key that stands twice is an error. A merge (`<<: *rod`) gives keys
+that its mapping does not give itself, and of several merged mappings the first that has a key gives it. No objects are
+built. A text is read in bounded time and memory, whatever stands in it.
+
+Files that rl_zoo3 reads too are `portable`: a scalar that YAML 1.1 reads otherwise is an error there.
 """
 
 from __future__ import annotations
 
-import copy
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import yaml
 
 from dms_core.errors import InputError
+from dms_core.input_file import MOST_BYTES, decoded, read_bytes
+from dms_core.validation import shown
+from dms_core.yaml_builder import FAST, Builder, Refused, Section, copied
+from dms_core.yaml_scalars import NUMBER, STANDARD, UNPRINTABLE
+
+MOST_PORTABLE = 100_000
+"""Largest file that is read by PyYAML's own parser, as rl_zoo3 does [bytes]; it takes up to 10 s for a megabyte."""
+SHORT = 20_000
+"""Longest text of which the content is kept [characters]."""
 
 
-class Section(dict):
-    """A mapping of a file that knows its line, counted from 1."""
-
-    line: int = 0
-
-
-class _Loader(yaml.SafeLoader):
-    """Safe loader of `Section`s."""
-
-    yaml_implicit_resolvers = {
-        first: [(tag, pattern) for tag, pattern in rules if not tag.endswith((":bool", ":float"))]
-        for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
-
-    def section(self, node: yaml.MappingNode) -> Section:
-        self.flatten_mapping(node)
-        found = Section()
-        found.line = node.start_mark.line + 1
-        for key_node, value_node in node.value:
-            key = self.construct_object(key_node, deep=True)
-            where = key_node.start_mark
-            if not isinstance(key, str):
-                raise yaml.MarkedYAMLError(problem=f"the key {key!r} is not text", problem_mark=where)
-            if key in found:
-                raise yaml.MarkedYAMLError(problem=f"the key '{key}' stands twice", problem_mark=where)
-            found[key] = self.construct_object(value_node, deep=True)
-        return found
-
-
-_Loader.add_constructor("tag:yaml.org,2002:map", _Loader.section)
-_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(?:true|True|false|False)$"), list("tTfF"))
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(
-        r"^[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE]))(?:[eE][-+]?[0-9]+)?$|^[-+]?\.(?:inf|Inf)$|^\.(?:nan|NaN)$"
-    ),
-    list("-+0123456789."),
-)
-
-
-def read_yaml(path: str | Path) -> Section:
+def read_yaml(path: str | Path, *, portable: bool = False) -> Section:
     """The mapping that a YAML file holds.
+
+    Args:
+        path: a regular file in UTF-8.
+        portable: refuse scalars that YAML 1.1 reads otherwise, for files that rl_zoo3 reads too.
 
     Raises:
         InputError: the file cannot be read, is not YAML, or holds no mapping; names file and line.
     """
-    path = Path(path)
+    slow = portable or FAST is yaml.SafeLoader
+    content = read_bytes(path, MOST_PORTABLE if slow else MOST_BYTES)
+    return parse_yaml(decoded(path, content), path, portable=portable)
+
+
+def parse_yaml(text: str, path: str | Path, *, portable: bool = False) -> Section:
+    """The mapping that the text of a file stands for, see `read_yaml`; the caller's to change.
+
+    Raises:
+        InputError: the text is not YAML or no mapping; names file and line.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(f"file '{path}' cannot be read: {reason}.") from None
-    try:
-        # What is handed out is the caller's to change.
-        found = copy.deepcopy(_parsed(text))
+        found = copied(_kept(text, portable)) if len(text) <= SHORT else _parsed(text, portable)
     except yaml.YAMLError as error:
-        raise InputError(_sentence(path, error)) from None
+        raise InputError(_sentence(f"file '{path}'", error, text)) from None
     if not isinstance(found, Section):
         what = "nothing" if found is None else f"a {type(found).__name__}"
         raise InputError(f"file '{path}' holds {what}. Expected a mapping of keys to values.")
     return found
-
-
-@lru_cache(maxsize=64)
-def _parsed(text: str) -> Any:
-    """What a text stands for; kept, since environments of a batch read the same files."""
-    return yaml.load(text, Loader=_Loader)
 
 
 def read_value(text: str) -> Any:
@@ -94,14 +67,65 @@ def read_value(text: str) -> Any:
         InputError: the text is not YAML.
     """
     try:
-        return yaml.load(text, Loader=_Loader)
+        return _parsed(text, False)
     except yaml.YAMLError as error:
-        raise InputError(f"value {text!r} is not valid YAML: {getattr(error, 'problem', None) or error}.") from None
+        raise InputError(_sentence(f"value {shown(text)}", error, text, place=False)) from None
 
 
-def _sentence(path: Path, error: yaml.YAMLError) -> str:
-    """Which line is wrong and why."""
+def write_yaml(content: Any, file: IO[str] | None = None, **layout: Any) -> str:
+    """Write what `read_yaml` and readers of YAML 1.1 read back as it was.
+
+    Args:
+        content: mappings, lists and scalars.
+        file: where to; None: nowhere.
+        layout: arguments of `yaml.dump`.
+
+    Returns:
+        The text.
+    """
+    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, width=120, **layout)
+    if file is not None:
+        file.write(text)
+    return text
+
+
+class _Dumper(yaml.SafeDumper):
+    """Puts texts into quotes that are numbers in YAML 1.2, such as '1e5', beside those that are numbers in 1.1."""
+
+
+_Dumper.add_implicit_resolver(f"{STANDARD}float", NUMBER, list("-+.0123456789"))
+
+
+@lru_cache(maxsize=64)
+def _kept(text: str, portable: bool) -> Any:
+    """What a short text stands for; kept, since environments of a batch read the same files."""
+    return _parsed(text, portable)
+
+
+def _parsed(text: str, portable: bool) -> Any:
+    """What a text stands for."""
+    found = UNPRINTABLE.search(text)
+    if found and not (found[0] == "\ufeff" and found.start() == 0):
+        before = text[: found.start()]
+        line, column = before.count("\n"), found.start() - before.rfind("\n") - 1
+        mark: Any = yaml.Mark("", found.start(), line, column, "", 0)
+        raise Refused(problem=f"the character {found[0]!r} is not allowed", problem_mark=mark)
+    try:
+        return Builder(text, portable).document()
+    except (ValueError, OverflowError) as error:  # numbers of escapes and directives that PyYAML does not check
+        raise yaml.YAMLError(str(error)) from None
+
+
+def _sentence(what: str, error: yaml.YAMLError, text: str, place: bool = True) -> str:
+    """What is wrong, and in which line where there are several."""
     mark = getattr(error, "problem_mark", None)
-    where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+    where = f", line {mark.line + 1}, column {mark.column + 1}" if mark and place else ""
     parts = [p for p in (getattr(error, "context", None), getattr(error, "problem", None)) if p]
-    return f"file '{path}'{where} is not valid YAML: {'; '.join(parts) or error}."
+    if isinstance(error, Refused):
+        return f"{what}{where}: {'; '.join(parts)}."
+    if mark and "cannot start any token" in parts[-1]:
+        lines = re.split("\r\n|[\n\r\x85\u2028\u2029]", text)
+        character = "".join(lines[mark.line : mark.line + 1])[mark.column : mark.column + 1]
+        parts = ["a tab '\\t' stands where only spaces may" if character == "\t" else
+                 f"no value begins with {character!r}; put it in quotes if it is text"]  # fmt: skip
+    return f"{what}{where} is not valid YAML: {'; '.join(parts) or ' '.join(str(error).split())}."

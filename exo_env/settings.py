@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from dms_core.config_files import config_file
 from dms_core.errors import InputError
-from dms_core.validation import Checked, plain
+from dms_core.validation import Checked, plain, shown
 from dms_core.yaml_text import read_yaml
 
 
@@ -76,5 +76,5 @@ def given_mapping(key: str, value: Any, expected: str) -> dict[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-        raise InputError(f"{key} = {plain(value)!r}: expected a mapping with {expected}.")
+        raise InputError(f"{key} = {shown(value)}: expected a mapping with {expected}.")
     return plain(value)

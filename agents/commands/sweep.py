@@ -33,7 +33,7 @@ def sweep(
         configs: YAML files in the format of rl_zoo3, as in configs/agents.
         out: folder of the trainings, one in each CONFIG_SEED; with a cluster, one that all its machines see.
         seeds: of the trainings.
-        changes: values that replace those of all configurations.
+        changes: values that replace those of all configurations, as for train.
         address: of a Ray cluster, or 'auto' for that of this machine; a local one is started where it is not given.
         cpus: processes of a local one.
         environment: id of the section to take of each file, where it has several.

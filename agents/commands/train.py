@@ -38,7 +38,7 @@ def train(
         config: YAML file in the format of rl_zoo3, as in configs/agents.
         seed: decides all that is random.
         changes: values that replace those of the configuration, for example n_timesteps=1e5 policy_kwargs.net_arch=[32]
-            training.eval_every=1e4.
+            training.eval_every=1e4. A value is YAML 1.2, so that 1e5 is a number, 010 is 10 and yes is text.
         out: folder of the training, empty or new; out/training/ALGORITHM_SEED where it is not given.
         resume: folder of a training to go on with; of the values only n_timesteps and training.* may then be changed.
         environment: id of the section of the configuration to take; module:ID where another package registers it.

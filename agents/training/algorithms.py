@@ -12,7 +12,7 @@ import inspect
 import math
 import re
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Union, get_args, get_origin
 
 import torch
@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import shown
 
 from .config import OURS, Config
 from .critic import TwoViewPolicy, seen_places
@@ -49,6 +50,19 @@ SMALL, NEARLY_ALL = 0.01, 0.99
 action at which a tanh is not yet so flat that nothing is learned."""
 SHARES, POSITIVE = ("gamma", "gae_lambda"), ("learning_rate", "clip_range")
 """Arguments that lie from 0 to 1, and above 0."""
+LARGEST, MOST, UNITS = 1e30, 10**9, (1, 10_000)
+"""Size of a number, which PyTorch holds in 32 bits; most things; and how many units and parts a network may have."""
+COUNTS = {
+    "n_steps": (1, MOST), "batch_size": (1, MOST), "n_epochs": (1, MOST), "buffer_size": (1, MOST),
+    "learning_starts": (0, MOST), "net_arch": UNITS, "lstm_hidden_size": UNITS, "n_lstm_layers": UNITS,
+    "n_critics": UNITS, "n_quantiles": UNITS,
+}  # fmt: skip
+"""Least and largest of arguments that are numbers of things."""
+TEXTS = {
+    "ent_coef": re.compile(r"auto(?:_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)?"),
+    "target_entropy": re.compile("auto"),
+}
+"""What may stand in place of a number; an entropy coefficient is learned from a value on: auto_0.1."""
 
 
 def find(name: str) -> type[BaseAlgorithm]:
@@ -58,7 +72,7 @@ def find(name: str) -> type[BaseAlgorithm]:
         InputError: there is none of this name; lists those there are.
     """
     if name not in ALGORITHMS:
-        raise InputError(f"unknown algorithm '{name}'. There are: {choices(ALGORITHMS)}.")
+        raise InputError(f"unknown algorithm {shown(name)}. There are: {choices(ALGORITHMS)}.")
     return ALGORITHMS[name]
 
 
@@ -70,7 +84,7 @@ def arguments(config: Config) -> dict[str, Any]:
     """
     name, algorithm = config.training.algorithm, find(config.training.algorithm)
     if config.policy not in policies(name):
-        raise InputError(f"policy = '{config.policy}'; {name} takes {choices(policies(name))}.")
+        raise InputError(f"policy = {shown(config.policy)}; {name} takes {choices(policies(name))}.")
     start, squashed = config.training.start, name in SQUASHED
     if start is not None and squashed and max(map(abs, start)) > NEARLY_ALL:
         raise InputError(f"training.start = {list(start)}; {name} takes from {-NEARLY_ALL} to {NEARLY_ALL}.")
@@ -80,6 +94,7 @@ def arguments(config: Config) -> dict[str, Any]:
     _check_ranges(name, config.arguments)
     given = config.arguments.get("policy_kwargs", {})
     _check(f"{name}: policy_kwargs", given, allowed(algorithm.policy_aliases[config.policy]))
+    _check_ranges(f"{name}: policy_kwargs", given)
     if squashed and start is None and "log_std_init" in given:
         raise InputError(f"{name}: policy_kwargs: log_std_init does nothing without training.start.")
     made = {k: _scheduled(v) for k, v in config.arguments.items()}
@@ -108,7 +123,7 @@ def activation(name: str) -> type[nn.Module]:
     """
     key = str(name).rpartition(".")[2].lower().replace("_", "")
     if key not in ACTIVATIONS:
-        raise InputError(f"policy_kwargs: activation_fn = '{name}': expected one of {choices(ACTIVATIONS)}.")
+        raise InputError(f"policy_kwargs: activation_fn = {shown(str(name))}: expected one of {choices(ACTIVATIONS)}.")
     return ACTIVATIONS[key]
 
 
@@ -127,7 +142,7 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
         made = find(config.training.algorithm)(
             policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given
         )
-    except (AssertionError, ValueError, TypeError, RuntimeError) as error:
+    except (AssertionError, ValueError, TypeError, RuntimeError, MemoryError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{config.training.algorithm} refuses its arguments: {said}") from None
     if config.training.start is not None:
@@ -156,12 +171,12 @@ def _begin_at(policy: Any, action: torch.Tensor) -> None:
 def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str] = ()) -> None:
     """Refuses unknown keys and wrong types; `others`: keys that may stand beside these."""
     if not isinstance(given, Mapping):
-        raise InputError(f"{who} = {given!r}: expected a mapping.")
+        raise InputError(f"{who} = {shown(given)}: expected a mapping.")
     for key, value in given.items():
         if key not in known:
             raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices([*known, *others])}.")
         if key != "activation_fn" and not fits(value, known[key]):
-            raise InputError(f"{who}: {key} = {value!r}: expected {_in_words(known[key])}.")
+            raise InputError(f"{who}: {key} = {shown(value)}: expected {_in_words(known[key])}.")
 
 
 def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
@@ -169,9 +184,27 @@ def _check_ranges(who: str, given: Mapping[str, Any]) -> None:
     for key, value in given.items():
         number = float(value.removeprefix("lin_")) if isinstance(value, str) and SCHEDULE.fullmatch(value) else value
         if key in SHARES and not 0.0 <= number <= 1.0:
-            raise InputError(f"{who}: {key} = {value!r}: expected a number from 0 to 1.")
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a number from 0 to 1.")
         if key in POSITIVE and not 0.0 < number < math.inf:
-            raise InputError(f"{who}: {key} = {value!r}: expected a positive number.")
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a positive number.")
+        if key in TEXTS and isinstance(value, str) and not TEXTS[key].fullmatch(value):
+            raise InputError(f"{who}: {key} = {shown(value)}: expected a number or auto.")
+        if key == "policy_kwargs":
+            continue  # has ranges of its own
+        least, most = COUNTS.get(key, (-LARGEST, LARGEST))
+        if not all(least <= x <= most for x in _numbers(value)):
+            raise InputError(f"{who}: {key} = {shown(value)}: expected numbers from {least:g} to {most:g}.")
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """All numbers in a value."""
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        for one in value:
+            yield from _numbers(one)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield value
 
 
 def fits(value: Any, hint: Any) -> bool:

@@ -4,12 +4,16 @@ A file has a section named after the environment, with the algorithm's arguments
 beside them n_envs, n_timesteps, policy, normalize, frame_stack and env_kwargs. A second section, `training`, which
 rl_zoo3 does not look at, says what it takes from its command line: how often to evaluate and to save.
 
+rl_zoo3 reads YAML 1.1, all else here is YAML 1.2; what the two read differently (010, 1e5 without a point and a sign,
+yes) is refused in such a file, with what to write instead (yaml_scalars.py).
+
 rl_zoo3 gives env_kwargs to the environments that it trains in, and none to those that it evaluates in. A section that
 it is to read therefore has them once more, as arguments of the wrapper SAME_SETTINGS, which it puts around both.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,15 +22,20 @@ from typing import Annotated, Any, Self
 from pydantic import Field
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import shown
 from dms_core.yaml_text import read_yaml
 from exo_env.settings import Settings
 
-from .config_file import SAME_SETTINGS, TRAINING, check_wrapper, chosen, override_value, sections
+from .config_file import SAME_SETTINGS, TRAINING, check_wrapper, chosen, override_values, sections
 from .rl_zoo_text import plain, write_call
 
 ALIASES = {"ppo_lstm": "recurrent_ppo"}
 """rl_zoo3's name of an algorithm to that of Stable-Baselines3."""
 
+MOST_ENVS, MOST_STEPS, MOST_FRAMES = 10_000, 10**12, 1000
+"""Most environments, steps and observations in a stack."""
+Steps = Annotated[int, Field(ge=1, le=MOST_STEPS)]
+"""A number of steps."""
 Component = Annotated[float, Field(ge=-1.0, le=1.0)]
 """One component of an action."""
 
@@ -35,10 +44,12 @@ class Training(Settings):
     """How a run is watched and kept."""
 
     algorithm: str = Field(description="name, see algorithms.py")
-    eval_every: int = Field(default=50_000, ge=1, description="steps between two evaluations")
+    eval_every: Steps = Field(default=50_000, description="steps between two evaluations")
     eval_patients: int = Field(default=10, ge=1, le=1000, description="episodes of an evaluation")
-    eval_seed: int = Field(default=20_251_013, ge=0, description="of its patients, the same ones every time")
-    save_every: int = Field(default=50_000, ge=1, description="steps between two checkpoints")
+    eval_seed: int = Field(
+        default=20_251_013, ge=0, le=2**63 - 1, description="of its patients, the same ones every time"
+    )
+    save_every: Steps = Field(default=50_000, description="steps between two checkpoints")
     threads: int = Field(default=1, ge=1, le=256, description="of PyTorch; small networks gain nothing from more")
     traces: tuple[float, ...] = Field(
         default=(),
@@ -47,10 +58,13 @@ class Training(Settings):
     )
     hold: int = Field(default=1, ge=1, le=100, description="control periods that an action is held")
     start: tuple[Component, ...] | None = Field(
-        default=None, description="action of the untrained policy, from which it learns to differ; None: all 0"
+        default=None,
+        max_length=MOST_FRAMES,
+        description="action of the untrained policy, from which it learns to differ; None: all 0",
     )
     against: tuple[Component, ...] | None = Field(
         default=None,
+        max_length=MOST_FRAMES,
         description="action whose reward on the same patient is taken off that of training; None: none",
     )
     critic: tuple[str, ...] = Field(default=(), description="groups or channels that only PPO's critic sees")
@@ -83,8 +97,8 @@ class Config:
 
         Args:
             path: the algorithm is named after it unless its `training` section says otherwise.
-            overrides: `key=value` or `key.key=value`, the value in YAML; keys of the environment's section, or of
-                `training` as `training.key`.
+            overrides: `key=value` or `key.key=value`, the value in YAML 1.2, where 1e5 is a number; keys of the
+                environment's section, or of `training` as `training.key`. Each key stands once.
             environment: id of the section to take, where a file has several; the default one, or the only one of an
                 environment that is registered, where it is not given.
 
@@ -93,7 +107,7 @@ class Config:
         """
         path = Path(path)
         try:
-            return cls.of(read_yaml(path), path.stem, overrides, environment)
+            return cls.of(read_yaml(path, portable=True), path.stem, overrides, environment)
         except InputError as error:
             said = str(error)
             raise InputError(said if str(path) in said else f"{path}: {said}") from None
@@ -106,23 +120,23 @@ class Config:
         key, used = chosen(content, environment)
         section, training = sections(content, key)
         check_wrapper(section)
-        for override in overrides:
-            override_value(section, training, override)
+        override_values(section, training, overrides)
         training.setdefault("algorithm", name)
-        training["algorithm"] = ALIASES.get(training["algorithm"], training["algorithm"])
+        if isinstance(training["algorithm"], str):
+            training["algorithm"] = ALIASES.get(training["algorithm"], training["algorithm"])
         rest = {k: v for k, v in section.items() if k not in OURS}
         policy = section.get("policy", "MlpPolicy")
         if not isinstance(policy, str):
-            raise InputError(f"policy = {policy!r}: expected the name of a policy.")
+            raise InputError(f"policy = {shown(policy)}: expected the name of a policy.")
         return cls(
             training=Training(**training),
             environment=used,
-            n_envs=_whole("n_envs", section.get("n_envs", 1)),
-            n_timesteps=_whole("n_timesteps", _needed(section, "n_timesteps")),
+            n_envs=_whole("n_envs", section.get("n_envs", 1), MOST_ENVS),
+            n_timesteps=_whole("n_timesteps", _needed(section, "n_timesteps"), MOST_STEPS),
             policy=policy,
             env_kwargs=_mapping("env_kwargs", section.get("env_kwargs", {})),
             normalize=_normalisation(section.get("normalize", False), section),
-            frame_stack=_whole("frame_stack", section.get("frame_stack", 1)),
+            frame_stack=_whole("frame_stack", section.get("frame_stack", 1), MOST_FRAMES),
             arguments=rest,
             section=section,
         )
@@ -146,16 +160,17 @@ def _needed(section: Mapping[str, Any], key: str) -> Any:
     return section[key]
 
 
-def _whole(key: str, value: Any) -> int:
+def _whole(key: str, value: Any, most: int) -> int:
     """A whole number from 1; 1e6 is one."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not float(value).is_integer() or value < 1:
-        raise InputError(f"{key} = {value!r}: expected a whole number from 1.")
+    number = not isinstance(value, bool) and isinstance(value, int | float)
+    if not (number and 1 <= value <= most and value == int(value)):
+        raise InputError(f"{key} = {shown(value)}: expected a whole number from 1 to {most:g}.")
     return int(value)
 
 
 def _mapping(key: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise InputError(f"{key} = {value!r}: expected a mapping.")
+        raise InputError(f"{key} = {shown(value)}: expected a mapping.")
     return dict(value)
 
 
@@ -171,8 +186,8 @@ def _normalisation(value: Any, section: Mapping[str, Any]) -> dict[str, Any] | N
         if key not in NORMALISATION:
             raise InputError(f"normalize: unknown key '{key}'. Allowed: {choices(NORMALISATION)}.")
         kinds = (bool,) if NORMALISATION[key] is bool else (int, float)
-        if not isinstance(one, kinds) or (bool not in kinds and (isinstance(one, bool) or one <= 0)):
+        if not isinstance(one, kinds) or (bool not in kinds and (isinstance(one, bool) or not 0 < one < math.inf)):
             right = "true or false" if bool in kinds else "a positive number"
-            raise InputError(f"normalize: {key} = {one!r}: expected {right}.")
+            raise InputError(f"normalize: {key} = {shown(one)}: expected {right}.")
     gamma = section.get("gamma")
     return given | ({"gamma": gamma} if isinstance(gamma, float) else {})

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import cut, shown
+from dms_core.yaml_builder import MOST_DEPTH
 from dms_core.yaml_text import read_value
 
 from ..environment import ENVIRONMENT, environment_id, environments
@@ -52,7 +54,7 @@ def sections(content: Mapping[str, Any], name: str) -> tuple[dict[str, Any], dic
     """The environment's section and ours."""
     for key, value in ((name, content[name]), (TRAINING, content.get(TRAINING, {}))):
         if not isinstance(value, Mapping):
-            raise InputError(f"section '{key}' holds {value!r}: expected a mapping of keys to values.")
+            raise InputError(f"section '{key}' holds {shown(value)}: expected a mapping of keys to values.")
     section = dict(content[name])
     for key in MAPPINGS:
         if isinstance(section.get(key), str):
@@ -70,17 +72,26 @@ def check_wrapper(section: dict[str, Any]) -> None:
         return
     (given,) = wrapper if isinstance(wrapper, list) and len(wrapper) == 1 else (wrapper,)
     if not isinstance(given, Mapping) or list(given) != [SAME_SETTINGS]:
-        raise InputError(f"env_wrapper = {wrapper!r}: expected none, or {SAME_SETTINGS} with the env_kwargs.")
+        raise InputError(f"env_wrapper = {shown(wrapper)}: expected none, or {SAME_SETTINGS} with the env_kwargs.")
     if given[SAME_SETTINGS] != section.get("env_kwargs", {}):
         raise InputError(f"env_wrapper: {SAME_SETTINGS} has other settings than env_kwargs; expected the same.")
 
 
-def override_value(section: dict[str, Any], training: dict[str, Any], text: str) -> None:
+def override_values(section: dict[str, Any], training: dict[str, Any], texts: Sequence[str]) -> None:
+    """Replace values, in the order in which they are given; each key stands once."""
+    keys = [text.partition("=")[0].strip() for text in texts]
+    for key, text in zip(keys, texts, strict=True):
+        if keys.count(key) > 1:
+            raise InputError(f"--set {cut(text)}: '{cut(key)}' stands {keys.count(key)} times; expected once.")
+        _override(section, training, text)
+
+
+def _override(section: dict[str, Any], training: dict[str, Any], text: str) -> None:
     """Replace one value."""
     key, equals, value = text.partition("=")
     path = key.strip().split(".")
-    if not equals or not all(path):
-        raise InputError(f"--set {text}: expected key=value, for example n_timesteps=1000.")
+    if not equals or not all(path) or len(path) > MOST_DEPTH:
+        raise InputError(f"--set {cut(text)}: expected key=value, for example n_timesteps=1000.")
     place: Any = section
     if path[0] == TRAINING and len(path) > 1:
         place, path = training, path[1:]
@@ -88,6 +99,9 @@ def override_value(section: dict[str, Any], training: dict[str, Any], text: str)
         place[part] = dict(place.get(part) or {}) if isinstance(place.get(part), Mapping | None) else None
         place = place[part]
         if place is None:
-            raise InputError(f"--set {text}: '{part}' is not a mapping.")
-    new = read_value(value)
-    place[path[-1]] = read_call(new) if path[-1] in MAPPINGS and isinstance(new, str) else new
+            raise InputError(f"--set {cut(text)}: '{cut(part)}' is not a mapping.")
+    try:
+        new = read_value(value)
+        place[path[-1]] = read_call(new) if path[-1] in MAPPINGS and isinstance(new, str) else new
+    except InputError as error:
+        raise InputError(f"--set {cut(key)}: {error}") from None

@@ -11,6 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from dms_core.errors import InputError
+from dms_core.validation import cut, shown
+
+LONGEST = 2000
+"""Characters of such a text; Python's parser may take deep nesting of longer ones for the end of its stack."""
 
 
 class Name(str):
@@ -27,14 +31,15 @@ def read_call(text: str) -> dict[str, Any]:
     Raises:
         InputError: the text is something else; names the part.
     """
+    expected = "expected dict(key=value, ...) with plain values"
+    if len(text) > LONGEST:
+        raise InputError(f"{shown(text)} has {len(text)} characters: {expected}, at most {LONGEST} characters.")
     try:
         mapping = _value(ast.parse(text.strip(), mode="eval").body)
-    except (SyntaxError, ValueError) as error:
-        raise InputError(
-            f"{text!r} is not a mapping ({error}): expected dict(key=value, ...) with plain values."
-        ) from None
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise InputError(f"{shown(text)} is not a mapping ({cut(str(error))}): {expected}.") from None
     if not isinstance(mapping, dict):
-        raise InputError(f"{text!r} is a {type(mapping).__name__}: expected dict(key=value, ...) with plain values.")
+        raise InputError(f"{shown(text)} is a {type(mapping).__name__}: {expected}.")
     return mapping
 
 
@@ -47,15 +52,27 @@ def _value(node: ast.expr) -> Any:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "dict" and not node.args:
         if any(k.arg is None for k in node.keywords):
             raise ValueError("'**' is not plain")
-        return {str(k.arg): _value(k.value) for k in node.keywords}
+        return _mapping([(str(k.arg), _value(k.value)) for k in node.keywords])
     if isinstance(node, ast.Name | ast.Attribute):
         return Name(_dotted(node))
     if isinstance(node, ast.List | ast.Tuple):
         items = [_value(e) for e in node.elts]
         return items if isinstance(node, ast.List) else tuple(items)
     if isinstance(node, ast.Dict):
-        return {_key(k): _value(v) for k, v in zip(node.keys, node.values, strict=True)}
-    return ast.literal_eval(node)
+        return _mapping([(_key(k), _value(v)) for k, v in zip(node.keys, node.values, strict=True)])
+    found = ast.literal_eval(node)
+    if not isinstance(found, bool | int | float | str | None):
+        raise ValueError(f"a {type(found).__name__} is not plain")
+    return found
+
+
+def _mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A mapping whose keys stand once."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [key for key, _ in pairs]
+        raise ValueError(f"the key '{next(key for key in names if names.count(key) > 1)}' stands twice")
+    return found
 
 
 def _key(node: ast.expr | None) -> str:

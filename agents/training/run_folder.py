@@ -20,10 +20,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from dms_core.errors import InputError
 from dms_core.output_file import check_writable, whole_file, write_json
+from dms_core.yaml_text import write_yaml
 
 from ..checkpoint import Store
 from ..environment import environment_id
@@ -82,7 +81,7 @@ class RunFolder:
     def write_config(self, config: Config) -> None:
         """Keep the configuration."""
         with whole_file(self.path / CONFIG) as file:
-            yaml.safe_dump(config.content(), file, sort_keys=False, width=120)
+            write_yaml(config.content(), file)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

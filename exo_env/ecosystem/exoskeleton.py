@@ -19,6 +19,7 @@ from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from dms_core.model.element import Vector
 from dms_core.model.geometry.rotations import dot, sub
+from dms_core.validation import shown
 from exo_env.jit import compiled
 from exo_env.settings import Settings
 
@@ -28,6 +29,8 @@ TWO_ROPES = {"agonist": "flexion", "antagonist": "extension"}
 """Ropes of a device file of version 0.1, and which way each turns the elbow."""
 LEAST_ANGLE, MOST_ANGLE, ANGLE_STEP = 20, 100, 5
 """Hinge angles of the exercise at which the leverage of a rope is checked [deg]."""
+MOST_ROPES = 100
+"""Most ropes of a device."""
 LEAST_LEVERAGE = 0.001
 """Least moment arm of a rope [m]; a controller divides by it, and a device of an arm's size has centimetres."""
 
@@ -92,7 +95,9 @@ class Exoskeleton(Settings):
     upper_link: Link
     lower_link: Link
     hinge_damping: float = Field(ge=0.0, description="viscous friction [N m s/rad]")
-    ropes: dict[str, Rope] = Field(min_length=1, description="ropes by name, each with a motor of its own")
+    ropes: dict[str, Rope] = Field(
+        min_length=1, max_length=MOST_ROPES, description="ropes by name, each with a motor of its own"
+    )
     guide_distance: float = Field(gt=0.0, le=0.6, description="from the hinge to the guided point of the forearm [m]")
     actuator: Actuator
     tuning: CriticalOscillation
@@ -106,7 +111,10 @@ class Exoskeleton(Settings):
         if not isinstance(data, Mapping) or not set(TWO_ROPES) & set(data):
             return data
         given = {name: dict(data[name]) for name in TWO_ROPES if isinstance(data.get(name), Mapping)}
-        ropes = {**dict(data.get("ropes", {})), **{k: {"pulls": TWO_ROPES[k], **x} for k, x in given.items()}}
+        more = data.get("ropes", {})
+        if not isinstance(more, Mapping):
+            raise ValueError(f"ropes = {shown(more)}: expected a mapping of ropes by name")
+        ropes = {**more, **{k: {"pulls": TWO_ROPES[k], **x} for k, x in given.items()}}
         return {**{k: x for k, x in data.items() if k not in given}, "ropes": ropes}
 
     @model_validator(mode="after")
@@ -146,11 +154,11 @@ class Exoskeleton(Settings):
             >>> Exoskeleton.named("elbow").lifting_rope
             'agonist'
         """
-        if source.endswith((".yaml", ".yml")):
+        if isinstance(source, str) and source.endswith((".yaml", ".yml")):
             return cls.from_file(source)
         shipped = shipped_devices()
         if source not in shipped:
-            raise InputError(f"exoskeleton = {source!r}: expected one of {choices(shipped)}, or a YAML file.")
+            raise InputError(f"exoskeleton = {shown(source)}: expected one of {choices(shipped)}, or a YAML file.")
         return cls.from_config(f"exoskeletons/{source}.yaml")
 
     def changed(self, **changes: Any) -> Self:

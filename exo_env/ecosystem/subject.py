@@ -23,8 +23,11 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, model_v
 
 from dms_core.config_files import config_file, configs
 from dms_core.errors import InputError, choices
+from dms_core.input_file import decoded, read_bytes
+from dms_core.model import ThelenMuscle
 from dms_core.model.element import Vector
-from dms_core.yaml_text import read_yaml
+from dms_core.validation import shown
+from dms_core.yaml_text import parse_yaml
 from exo_env.settings import Settings
 
 DEFAULT = "arm26"
@@ -117,13 +120,23 @@ class SubjectFacts(Facts):
             for point in muscle.path:
                 if point.body not in bodies:
                     raise ValueError(f"muscles.{name}.path: body = '{point.body}': expected one of {choices(bodies)}")
+            _check_muscle(name, {**self.muscle_defaults, **dict(muscle)})
         return self
+
+
+def _check_muscle(name: str, facts: dict[str, Any]) -> None:
+    """Refuse a muscle that no arm could be given; `facts` are its fields."""
+    for key in ("name", "excitation"):
+        if key in facts:
+            raise ValueError(f"muscles.{name}: unknown key '{key}'; it is decided by the muscle's name")
+    points = [{"body": point.body, "point": point.point} for point in facts["path"]]
+    ThelenMuscle(**{**facts, "name": name, "excitation": name, "path": points})
 
 
 def _check_role(role: str, name: str, known: Mapping[str, Any], section: str) -> None:
     """Refuse a role that nothing in the file has."""
     if name not in known:
-        raise ValueError(f"roles: {role} = {name!r}; expected one of the {section} {choices(known)}")
+        raise ValueError(f"roles: {role} = {shown(name)}; expected one of the {section} {choices(known)}")
 
 
 def _check_elbow_axis(joint: str, axis: Vector | None) -> None:
@@ -164,16 +177,12 @@ def read_subject(source: str | Subject) -> Subject:
     if isinstance(source, Subject):
         return source
     path = _path(source)
-    try:
-        content = path.read_bytes()
-    except OSError:
-        content = b""  # what reads the file below says why it cannot be read
-    return _read(str(path.resolve()) if _is_file(source) else source, path, content)
+    return _read(str(path.resolve()) if _is_file(source) else source, path, read_bytes(path))
 
 
 @lru_cache(maxsize=16)
 def _read(source: str, path: Path, content: bytes) -> Subject:
-    facts = read_yaml(path)
+    facts = parse_yaml(decoded(path, content), path)
     try:
         SubjectFacts(**facts)
     except InputError as error:
@@ -191,7 +200,7 @@ AnySubject = Annotated[
 
 def _is_file(source: str) -> bool:
     """Whether a subject is given by the path of a file, not by its name."""
-    return source.endswith((".yaml", ".yml"))
+    return isinstance(source, str) and source.endswith((".yaml", ".yml"))
 
 
 def _path(source: str) -> Path:
@@ -200,5 +209,5 @@ def _path(source: str) -> Path:
         return Path(source)
     shipped = sorted(p.stem for p in (configs() / "subject").glob("*.yaml"))
     if source not in shipped:
-        raise InputError(f"subject = {source!r}: expected one of {choices(shipped)}, or a YAML file.")
+        raise InputError(f"subject = {shown(source)}: expected one of {choices(shipped)}, or a YAML file.")
     return config_file(f"subject/{source}.yaml")

@@ -23,6 +23,7 @@ from pydantic import Field, model_validator
 from scipy.special import ndtr, ndtri
 
 from dms_core.errors import InputError, choices
+from dms_core.validation import shown
 from exo_env.jit import compiled
 from exo_env.settings import Settings
 from exo_env.streams import normal_quantile, streams, uniforms
@@ -123,15 +124,16 @@ class Normal(Settings):
 class Choice(Settings):
     """One of several values."""
 
-    choice: tuple[Value, ...] = Field(min_length=1)
+    choice: tuple[Value, ...] = Field(min_length=1, max_length=1000)
     weights: tuple[float, ...] | None = Field(default=None, description="relative, one for each; None: equal")
 
     @model_validator(mode="after")
     def _weighted(self):
         w = self.weights
-        if w is not None and (len(w) != len(self.choice) or min(w) < 0.0 or sum(w) <= 0.0):
+        if w is not None and (len(w) != len(self.choice) or min(w) < 0.0 or not 0.0 < sum(w) < math.inf):
             raise ValueError(
-                f"weights = {list(w)}: expected one number from 0 for each of {list(self.choice)}, not all 0"
+                f"weights = {shown(list(w))}: expected one number from 0 for each of {shown(list(self.choice))}, "
+                "not all 0"
             )
         return self
 
@@ -171,9 +173,9 @@ def distribution(spec: Any) -> Distribution:
         return Constant(constant=spec)
     if isinstance(spec, dict):
         for kind, cls in KINDS.items():
-            if kind in spec:
+            if kind in spec and all(isinstance(key, str) for key in spec):
                 return cls(**spec)
-    raise InputError(f"expected a value or a distribution ({choices(KINDS)}), got {spec!r}.")
+    raise InputError(f"expected a value or a distribution ({choices(KINDS)}), got {shown(spec)}.")
 
 
 STRAIGHT, LOGARITHMIC, NORMAL, OTHER = range(4)

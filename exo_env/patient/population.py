@@ -23,6 +23,7 @@ together. Otherwise fields are independent (assumed); what goes together is put 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +34,7 @@ from pydantic import Field, model_validator
 
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
+from dms_core.validation import shown
 from dms_core.yaml_text import read_yaml
 from exo_env.ecosystem.person import SEXES
 from exo_env.patient.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
@@ -58,8 +60,8 @@ class Population(Settings):
         if bool(self.mixture) == bool(self.fields or self.base):
             raise ValueError("expected either fields, with or without a base, or a mixture")
         if self.mixture:
-            if min(self.mixture.values()) < 0.0 or sum(self.mixture.values()) <= 0.0:
-                raise ValueError(f"mixture = {self.mixture}: expected weights from 0, not all 0")
+            if min(self.mixture.values()) < 0.0 or not 0.0 < sum(self.mixture.values()) < math.inf:
+                raise ValueError(f"mixture = {shown(self.mixture)}: expected weights from 0, not all 0")
             _ = self.parts
         else:
             self._check_fields()
@@ -74,7 +76,7 @@ class Population(Settings):
         """
         if name not in shipped_populations():
             raise InputError(
-                f"unknown population '{name}'. Shipped are: {choices(shipped_populations())}; or give a YAML file."
+                f"unknown population {shown(name)}. Shipped are: {choices(shipped_populations())}; or give a YAML file."
             )
         return cls.read(configs() / FOLDER / f"{name}.yaml")
 
@@ -213,8 +215,8 @@ def population(source: Source) -> Population:
             return Population(**source)
         return population(Patient(**source))
     raise InputError(
-        f"patient = {source!r}: expected a population ({choices(shipped_populations())}), a YAML file, or a mapping of "
-        "the fields of a patient."
+        f"patient = {shown(source)}: expected a population ({choices(shipped_populations())}), a YAML file, or a "
+        "mapping of the fields of a patient."
     )
 
 
@@ -263,4 +265,4 @@ def _checked(name: str, value: Any, fields: dict[str, Any]) -> None:
     try:
         _patient(fields)
     except (InputError, TypeError) as error:
-        raise InputError(f"fields: {name} reaches {value!r}: {error}") from None
+        raise InputError(f"fields: {name} reaches {shown(value)}: {error}") from None

@@ -13,6 +13,7 @@ from agents.training.config import Config
 from agents.training.rl_zoo_text import read_call, write_call
 from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.yaml_text import write_yaml
 from tests.agents.tiny import config_file, content
 
 SHIPPED = sorted((configs() / "agents").rglob("*.yml"))
@@ -154,13 +155,92 @@ def test_ends_of_a_range_belong_to_it(gamma):
     [
         ("--set n_steps: expected key=value", "n_steps"),
         ("--set n_steps.a=1: 'n_steps' is not a mapping", "n_steps.a=1"),
-        ("value '[1' is not valid YAML", "n_steps=[1"),
+        ("--set n_steps: value '[1' is not valid YAML", "n_steps=[1"),
         ("unknown key 'eval'", "training.eval=1"),
         ("unknown algorithm 'dqn'. There are: ppo, recurrent_ppo, sac, tqc", "training.algorithm=dqn"),
     ],
 )
 def test_mistakes_of_overrides_are_named(said, override):
     refused(said, overrides=[override])
+
+
+@pytest.mark.parametrize("value", [".inf", "-.inf", ".nan", "1e400", "1e31", "'1'", "true", "9" * 300, "[1]", "{a: 1}"])
+@pytest.mark.parametrize(
+    "key",
+    ["n_timesteps", "n_envs", "frame_stack", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda",
+     "learning_rate", "clip_range", "ent_coef", "vf_coef", "max_grad_norm", "target_kl", "policy_kwargs.log_std_init",
+     "policy_kwargs.net_arch", "normalize.clip_obs", "normalize.epsilon", "training.eval_every", "training.save_every",
+     "training.eval_patients", "training.eval_seed", "training.threads", "training.hold"],
+)  # fmt: skip
+def test_numbers_that_are_none_are_refused_by_key(key, value):
+    if key.startswith("normalize") and not set(value) - set("1e319"):
+        pytest.skip("a limit that is never reached")
+    if (key, value) == ("policy_kwargs.net_arch", "[1]"):
+        pytest.skip("a network of one unit")
+    refused(f"{key.rpartition('.')[2]}", overrides=[f"{key}={value}"], normalize={"norm_obs": True})
+
+
+@pytest.mark.parametrize(
+    ("said", "override"),
+    [
+        ("n_timesteps = inf: expected a whole number from 1 to 1e+12", "n_timesteps=1e400"),
+        ("n_envs = nan: expected a whole number from 1 to 10000", "n_envs=.nan"),
+        ("ppo: n_steps = 0: expected numbers from 1 to 1e+09", "n_steps=0"),
+        ("net_arch = [0]: expected numbers from 1 to 10000", "policy_kwargs.net_arch=[0]"),
+        ("ppo: max_grad_norm = inf: expected numbers from -1e+30 to 1e+30", "max_grad_norm=.inf"),
+        ("normalize: clip_obs = inf: expected a positive number", "normalize.clip_obs=.inf"),
+        ("Training: eval_every = inf: Expected a finite number", "training.eval_every=.inf"),
+        ("Training: traces.0 = nan: Expected a finite number", "training.traces=[.nan]"),
+        ("the key 'a' stands twice", "policy_kwargs=dict(a=1, a=2)"),
+        ("is not plain", "policy_kwargs=dict(a=1j)"),
+        ("--set gamma: value '&a [*a]'", "gamma=&a [*a]"),
+    ],
+)
+def test_what_is_allowed_is_said(said, override):
+    refused(said, overrides=[override], normalize={"norm_obs": True})
+
+
+@pytest.mark.parametrize(
+    ("said", "changes"),
+    [
+        ("sac: ent_coef = 'auto_x': expected a number or auto", {"ent_coef": "auto_x"}),
+        ("sac: target_entropy = '1': expected a number or auto", {"target_entropy": "1"}),
+        ("sac: buffer_size = 0: expected numbers from 1 to 1e+09", {"buffer_size": 0}),
+    ],
+)
+def test_texts_in_place_of_numbers_are_checked(said, changes):
+    refused(said, "sac", **changes)
+
+
+def test_a_key_is_set_once():
+    refused("--set gamma=0.9: 'gamma' stands 2 times; expected once", overrides=["gamma=0.9", "gamma=0.8"])
+
+
+@pytest.mark.parametrize("text", ["1e5", "010", "1:30", "1_000", "yes", "0o10", "2020-01-01"])
+def test_a_file_holds_what_rl_zoo3_reads_alike(text, tmp_path):
+    path = config_file(tmp_path)
+    path.write_text(path.read_text().replace("n_timesteps: 128", f"n_timesteps: {text}"))
+    with pytest.raises(InputError, match=f"ppo.yml', line [0-9]+, column 16: {text} is .* in YAML 1.1.* in YAML 1.2"):
+        Config.read(path)
+
+
+def test_a_value_of_set_is_read_as_yaml_1_2_and_kept_for_both(tmp_path):
+    used = Config.read(config_file(tmp_path), ["n_timesteps=1e5", "n_steps=010", "env_kwargs.patient='1e5'"])
+    assert (used.n_timesteps, used.arguments["n_steps"]) == (100_000, 10)
+    kept = tmp_path / "kept.yml"
+    with kept.open("w") as file:
+        write_yaml(used.content(), file)
+    assert Config.read(kept).content() == used.content()
+    assert yaml.safe_load(kept.read_text())[ENVIRONMENT]["env_kwargs"]["patient"] == "1e5"
+
+
+@pytest.mark.parametrize(
+    "text", ["(" * 1500, "dict(a=" + "-" * 1500 + "1)", "dict(a=" + "[" * 150, "dict(a='" + "x" * 9000]
+)
+def test_hostile_text_of_a_call_is_refused_briefly(text):
+    with pytest.raises(InputError, match="expected dict") as caught:
+        read_call(text)
+    assert len(str(caught.value)) < 400
 
 
 def test_another_environment_is_refused(tmp_path):

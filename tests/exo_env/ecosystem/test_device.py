@@ -23,6 +23,32 @@ from exo_env.ecosystem.worn_exoskeleton import Misalignment, WornExoskeleton, li
 DEVICE = Exoskeleton.named("elbow")
 UPPER, LOWER = (0.0, 0.20, 0.05), (0.0338, -0.0725, 0.05)
 """Ends of the shipped device's agonist [m]."""
+ROPE = {"pulls": "flexion", "upper": list(UPPER), "lower": list(LOWER)}
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"hinge_damping": "1.0"}, "hinge_damping = '1.0': Expected a number"),
+        ({"hinge_damping": True}, "hinge_damping = True: Expected a number"),
+        ({"upper_link": {"mass": 1, "centre_of_mass": [0, "0", 0], "inertia": [1, 1, 1]}}, "centre_of_mass.1 = '0'"),
+        ({"ropes": [1], "agonist": {"upper": [0, 0, 0]}}, r"ropes = \[1\]: expected a mapping of ropes"),
+        ({"ropes": {f"r{k}": ROPE for k in range(101)}}, "Expected at most 100 items"),
+        ({"ropes": {"mine": "x" * 5000}}, r"ropes.mine = 'x+\.\.\.: Expected a mapping"),
+    ],
+)
+def test_a_file_with_a_wrong_value_is_refused(change, complaint, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump({**yaml.safe_load(config_file("exoskeletons/elbow.yaml").read_text()), **change}))
+    with pytest.raises(InputError, match=f"(?s)mine.yaml: Exoskeleton: .*{complaint}") as caught:
+        Exoskeleton.named(str(path))
+    assert len(str(caught.value)) < 1000
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert DEVICE.changed(hinge_damping=np.float32(1.0), guide_distance=np.float64(0.16)) == DEVICE
+    with pytest.raises(InputError, match="hinge_damping = '1.0': Expected a number"):
+        DEVICE.changed(hinge_damping="1.0")
 
 
 @pytest.mark.parametrize(

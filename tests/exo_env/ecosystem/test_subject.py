@@ -47,6 +47,15 @@ def test_the_shipped_file_is_read_as_it_is():
             "muscles.BRA.path: body = 'moon': expected one of base",
         ),
         (("muscle_defaults", "activation_time_constant"), None, "'activation_time_constant' is missing"),
+        (("bodies", "base", "mass"), "1.8", "bodies.base: BodyFacts: mass = '1.8': Expected a number"),
+        (("gravity",), [True, 0, 0], "gravity.0 = True: Expected a number"),
+        (("muscles", "BRA", "max_isometric_force"), "987.3", "'BRA': max_isometric_force = '987.3': Expected a number"),
+        (("muscles", "BRA", "colour"), "red", "'BRA': unknown key 'colour'"),
+        (("muscles", "BRA", "name"), "BIClong", "muscles.BRA: unknown key 'name'"),
+        (("muscle_defaults", "activation_time_constant"), True, "activation_time_constant = True: Expected a number"),
+        (("muscle_defaults", "curves", "tendon_strain"), "0.033", "tendon_strain = '0.033': Expected a number"),
+        (("roles", "flexors"), "BRA", "flexors = 'BRA': Expected a list"),
+        (("roles", "elbow"), ["x" * 500] * 100, "roles: RoleFacts: elbow = ['xxxxx"),
     ],
 )
 def test_mistakes_are_named(tmp_path, keys, value, complaint):

@@ -194,6 +194,18 @@ def test_own_file(tmp_path):
         ("strength: 0.7\nfields: {height: 1.7}", "unknown key 'strength'"),
         ("strength: 70", "strength = 70"),
         ("fields: [", "not valid YAML"),
+        ("height: '1.8'", "height = '1.8': Expected a number"),
+        ("height: true", "height = True: Expected a number"),
+        ("height: 1:30", "height = '1:30': Expected a number"),
+        ("base: healthy\nfields: {height: '1.8'}", "height reaches '1.8': .*Expected a number"),
+        ("base: healthy\nfields: {height: {uniform: ['1.7', 1.8]}}", "uniform.0 = '1.7': Expected a number"),
+        ("base: healthy\nfields: {height: {choice: [1.7, true]}}", "choice.1"),
+        ("base: healthy\nfields: {height: {choice: [1.7], weights: [.inf]}}", "weights.0 = inf: Expected a finite"),
+        ("base: healthy\nfields: {height: {choice: [1.7, 1.8], weights: [1e308, 1e308]}}", "weights = .*from 0"),
+        ("base: healthy\nfields: {height: {1: 2}}", "the key 1 is not text"),
+        ("mixture: {healthy: '1'}", "mixture.healthy = '1': Expected a number"),
+        ("mixture: {healthy: 1e308, wide: 1e308}", "mixture = .*expected weights"),
+        ("self: 1", "unknown key 'self'"),
     ],
 )
 def test_mistakes_name_file_key_and_value(tmp_path, text, words):
