@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from tqdm import tqdm
 from tyro.conf import arg
 
+from dms_core.command_line import STOPPED, FolderOut
 from dms_core.config_files import configs
 from dms_core.errors import InputError
 
@@ -19,8 +20,6 @@ from ..environment import PROGRAM, environment_id
 from ..evaluation.episode import judged
 from ..training.usable import checked_config, require_training
 
-STOPPED = 130
-"""Exit status of a run that was told to stop."""
 BAR = "{percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt} steps, {rate_fmt}, {elapsed} passed, {remaining} left"
 
 
@@ -28,7 +27,7 @@ def train(
     config: Path | None = None,
     seed: int = 0,
     changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
-    out: Path | None = None,
+    out: FolderOut | None = None,
     resume: Path | None = None,
     environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
 ) -> int:

@@ -7,7 +7,10 @@ return, in which an unsafe episode weighs as much as it costs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import repeat
@@ -68,7 +71,7 @@ def tune(
     population: str = POPULATION,
     environment: str = ENVIRONMENT,
     workers: int = 1,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[Try], None] | None = None,
     **settings: Any,
 ) -> list[Try]:
     """Tries of a policy, best first.
@@ -81,7 +84,7 @@ def tune(
         population: of the patients, by name or YAML file.
         environment: its id.
         workers: processes.
-        progress: called with the name of the policy after each try.
+        progress: called with each try.
         settings: further ones of the environment.
 
     Raises:
@@ -110,9 +113,9 @@ def tune(
         for place, one in zip(places, tried, strict=True):
             done.append((place, one))
             if progress is not None:
-                progress(policy)
+                progress(one)
 
-    with ProcessPoolExecutor(workers) as pool:
+    with _pool(workers) as pool:
         first = tries // 2
         run(qmc.LatinHypercube(len(ranges), rng=generator).random(first), pool)
         while len(done) < tries:
@@ -120,6 +123,26 @@ def tune(
             count = min(BATCH, tries - len(done))
             run(np.clip(best + SPREAD * generator.standard_normal((count, len(ranges))), 0.0, 1.0), pool)
     return [one for _, one in sorted(done, key=_return, reverse=True)]
+
+
+@contextlib.contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end without a word when the user stops the command."""
+    with ProcessPoolExecutor(workers, initializer=_leave_signals_alone) as pool:
+        before = set(multiprocessing.active_children())
+        try:
+            yield pool
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in set(multiprocessing.active_children()) - before:
+                child.kill()
+            raise
+
+
+def _leave_signals_alone() -> None:
+    """Ctrl-C reaches every process of a terminal; this one leaves it to its parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _return(entry: tuple[np.ndarray, Try]) -> float:

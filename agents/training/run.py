@@ -16,6 +16,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dms_core.errors import DmsError
+from dms_core.output_file import write_text
 
 from ..policies.learned import LearnedPolicy
 from .algorithms import build
@@ -94,8 +95,8 @@ class TrainingRun:
         """
         left = self.config.n_timesteps - self.steps
         self._began = time.perf_counter() - self.seconds
-        self.model.set_logger(configure(str(self.folder.path / "tensorboard"), ["tensorboard"]))
         try:
+            self.model.set_logger(configure(str(self.folder.path / "tensorboard"), ["tensorboard"]))
             if left > 0:
                 self.model.learn(left, callback=_Watch(self), reset_num_timesteps=False)
             done = self.steps >= self.config.n_timesteps
@@ -135,7 +136,7 @@ class TrainingRun:
         def write(part: Path) -> None:
             save_state(self.model, part)
             self.policy().save(part)
-            (part / STATE).write_text(json.dumps(state), encoding="utf-8")
+            write_text(part / STATE, json.dumps(state))
 
         self.folder.checkpoints.save(checkpoint_name(self.steps), write)
         self.saved = self.steps

@@ -23,7 +23,7 @@ from typing import Any
 import yaml
 
 from dms_core.errors import InputError
-from dms_core.output_file import check_writable, whole_file, write_json
+from dms_core.output_file import check_writable, write_json, write_text
 
 from ..checkpoint import Store
 from ..environment import environment_id
@@ -81,8 +81,7 @@ class RunFolder:
 
     def write_config(self, config: Config) -> None:
         """Keep the configuration."""
-        with whole_file(self.path / CONFIG) as file:
-            yaml.safe_dump(config.content(), file, sort_keys=False, width=120)
+        write_text(self.path / CONFIG, yaml.safe_dump(config.content(), sort_keys=False, width=120))
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
