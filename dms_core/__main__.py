@@ -20,6 +20,7 @@ from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_co
 from dms_core.errors import DmsError, InputError, Stopped
 from dms_core.model_file import load
 from dms_core.output_file import check_columns, check_size, with_unit, write_csv, write_json, write_text
+from dms_core.output_place import descriptor
 from dms_core.outputs import OutputFile, Outputs, partial
 from dms_core.results import Result, States
 from dms_core.schema import reference
@@ -130,11 +131,12 @@ def run(
         summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
         if stats is not None:
             write_json(stats, summary)
+    # A table on standard output shall be nothing but a table.
+    lines = sys.stdout if descriptor(out) is None else sys.stderr
     for key, value in summary.items():
-        print(
-            f"{key.replace('_', ' ')}: {value:.4g}" if isinstance(value, float) else f"{key.replace('_', ' ')}: {value}"
-        )
-    print(f"written: {outputs.where(out)}")
+        shown = f"{value:.4g}" if isinstance(value, float) else value
+        print(f"{key.replace('_', ' ')}: {shown}", file=lines)
+    print(f"written: {outputs.where(out)}", file=lines)
     if not trajectory.success:
         print(f"The run failed: {trajectory.message} '{outputs.where(out)}' holds the part before.", file=sys.stderr)
         return FAILED_RUN

@@ -17,6 +17,7 @@ from tqdm import tqdm
 from tyro.constructors import PrimitiveConstructorSpec
 
 from dms_core.errors import DmsError, InputError, ModelWarning
+from dms_core.output_place import REMEDIES
 
 USER_MISTAKE, FAILED_RUN, STOPPED = 2, 1, 130
 """Exit statuses."""
@@ -81,7 +82,8 @@ def run_command(
         return 0
     except OSError as error:
         where = f"'{error.filename}': " if error.filename is not None else ""
-        print(f"error: {where}{error.strerror or error}.", file=sys.stderr)
+        advice = f"; {REMEDIES[error.errno]}" if error.errno in REMEDIES else ""
+        print(f"error: {where}{error.strerror or error}{advice}.", file=sys.stderr)
         return FAILED_RUN
 
 

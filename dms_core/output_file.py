@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import math
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
@@ -94,7 +95,7 @@ def check_columns(names: Iterable[str]) -> None:
     """
     seen: set[str] = set()
     for name in names:
-        if not name.isprintable():
+        if any(map(_controls, name)):
             raise InputError(f"column {name!r}: expected a name without line breaks and other control characters.")
         if name in seen:
             raise InputError(f"column '{name}' would stand twice in the table; give the sensor another name.")
@@ -151,8 +152,13 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """A text whose line breaks and other characters that cannot be printed are escaped, for a comment or a heading."""
-    return "".join(x if x.isprintable() else x.encode("unicode_escape").decode("ascii") for x in text)
+    """A text whose line breaks and other control characters are escaped, for a comment or a heading."""
+    return "".join(x.encode("unicode_escape").decode("ascii") if _controls(x) else x for x in text)
+
+
+def _controls(character: str) -> bool:
+    """Whether it breaks a line, controls a terminal, or is half a character."""
+    return unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp")
 
 
 def markdown_cell(text: str) -> str:

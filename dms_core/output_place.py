@@ -27,6 +27,8 @@ REMEDIES = {
     errno.ENAMETOOLONG: "choose a shorter name",
 }
 """What to do about an error by its number; another place is always right."""
+PROBE = 4096
+"""Written to see whether there is room at all [byte]."""
 MOST_LINKS = 40
 """Symbolic links that Linux follows, one after another."""
 Content = Callable[[IO[bytes]], object]
@@ -112,8 +114,12 @@ def is_file(path: str | Path) -> bool:
 
 def cannot(path: str | Path, error: OSError) -> str:
     """One sentence on an error of writing, with the place and what to do."""
-    remedy = REMEDIES.get(error.errno or 0, "choose another place")
-    return f"output '{path}' cannot be written ({error.strerror or error}); {remedy}."
+    return f"output '{_short(Path(path))}' cannot be written ({error.strerror or error}); {remedy(error)}."
+
+
+def remedy(error: OSError) -> str:
+    """What to do about an error of writing."""
+    return REMEDIES.get(error.errno or 0, "choose another place")
 
 
 def descriptor(path: Path) -> int | None:
@@ -176,7 +182,7 @@ def _mode(path: Path) -> int | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise InputError(cannot(_short(path), error)) from None
+        raise InputError(cannot(path, error)) from None
     except ValueError:
         raise InputError(f"output {str(path)!r}: expected a name without the character NUL.") from None
 
@@ -209,13 +215,15 @@ def _check_parent(path: Path, target: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         # Permission bits tell root nothing and network drives lie; only writing shows that writing works.
         handle, temporary = tempfile.mkstemp(dir=folder, prefix=PREFIX, suffix=SUFFIX)
-        os.close(handle)
-        os.unlink(temporary)
+        try:
+            # A full disk still makes empty files.
+            os.write(handle, bytes(PROBE))
+        finally:
+            os.close(handle)
+            os.unlink(temporary)
     except OSError as error:
-        remedy = REMEDIES.get(error.errno or 0, "choose another place")
-        raise InputError(
-            f"output '{_short(path)}': the folder '{_short(folder)}' cannot be written ({error.strerror}); {remedy}."
-        ) from None
+        reason = f"the folder '{_short(folder)}' cannot be written ({error.strerror}); {remedy(error)}"
+        raise InputError(f"output '{_short(path)}': {reason}.") from None
 
 
 def _short(path: Path) -> str:

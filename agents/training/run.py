@@ -17,6 +17,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dms_core.errors import DmsError
 from dms_core.output_file import write_text
+from dms_core.output_place import cannot
 
 from ..policies.learned import LearnedPolicy
 from .algorithms import build
@@ -104,9 +105,7 @@ class TrainingRun:
                 self.evaluate()
             self.save()
         except OSError as error:
-            raise DmsError(
-                f"'{self.folder.path}' cannot be written: {error.strerror or error}. {self._advice()}"
-            ) from None
+            raise DmsError(f"{cannot(self.folder.path, error)} {self._advice()}") from None
         except ValueError as error:
             if isinstance(error, DmsError) or not _diverged(self.model, error):
                 raise
