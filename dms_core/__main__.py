@@ -1,8 +1,8 @@
 """Command line of the DMS platform: check, run and describe model files.
 
 python -m dms_core check MODEL.yaml
-python -m dms_core run MODEL.yaml --t-end T --rtol R [--sample DT] --out FILE.csv [--stats FILE.json]
-python -m dms_core schema [--out FILE]
+python -m dms_core run MODEL.yaml --t-end T --rtol R [--sample DT] --out FILE.csv [--stats FILE.json] [--overwrite]
+python -m dms_core schema [--out FILE] [--overwrite]
 """
 
 from __future__ import annotations

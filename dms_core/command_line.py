@@ -74,7 +74,7 @@ def run_command(
         print(f"error: {error}", file=sys.stderr)
         return USER_MISTAKE
     except KeyboardInterrupt as stop:
-        print(f"stopped: {stop or 'nothing was written.'}", file=sys.stderr)
+        print(f"stopped: {str(stop) or 'nothing was written.'}", file=sys.stderr)
         return STOPPED
     except BrokenPipeError:
         # The reader (head, less) has seen enough; what is left to flush at exit must not complain either.

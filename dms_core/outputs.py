@@ -134,6 +134,8 @@ class Outputs:
         inside = self.folder is not None and path.parent == self.folder
         if inside and path.name not in (*self._known, *self._new) and is_file(path) and not self.overwrite:
             raise FileExistsError(errno.EEXIST, f"it exists and was not written by `{self.command}`", str(path))
+        if is_file(path) and self._input_at(path) is not None:
+            raise FileExistsError(errno.EEXIST, "it is an input", str(path))
         put(path, content)
         self.written.append(path)
         if inside and is_file(path):
@@ -177,13 +179,12 @@ class Outputs:
     def _check_folder(self, folder: Path) -> None:
         """Refuse a folder that cannot be written or that holds what must not be replaced."""
         check_folder(folder)
-        entries = [path for path in folder.iterdir() if path.name != MANIFEST]
-        if not entries:
+        if not any(path.name != MANIFEST for path in folder.iterdir()):
             return
-        for path in (folder, *entries):
-            if (same := self._input_at(path)) is not None:
-                raise InputError(f"the output folder '{folder}' holds the input '{same}'; choose another --out.")
         known = _listed(folder, self.command)
+        for path in (folder, *(folder / name for name in known or ())):
+            if (same := self._input_at(path)) is not None:
+                raise InputError(f"output '{path}' is the input '{same}'; choose another --out.")
         if self.overwrite:
             self._known = {n: h for n, h in (known or {}).items() if _hash(folder / n) == h}
             return

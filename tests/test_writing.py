@@ -7,7 +7,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ALLOWED = {
-    "dms_core/output_place.py": {"os.fdopen", "open", "os.replace", "os.write", "tempfile.mkstemp", "mkdir", "unlink"},
+    "dms_core/output_place.py": {
+        "os.fdopen",
+        "open",
+        "os.replace",
+        "os.write",
+        "os.unlink",
+        "chmod",
+        "tempfile.mkstemp",
+        "mkdir",
+        "unlink",
+    },
     "dms_core/outputs.py": {"tempfile.mkdtemp", "unlink", "rmdir"},
     # Stamps beside the machine code, which are no outputs.
     "dms_core/compiled/compilation.py": {"write_text", "unlink", "mkdir"},
@@ -70,7 +80,8 @@ def test_nothing_writes_in_another_way(package):
 @pytest.mark.parametrize(
     "text",
     ["open(path, 'w')", "path.open(mode='xb')", "open(path, how)", "path.write_text('x')", "np.savez(path, x=1)",
-     "figure.savefig(path)", "json.dump(x, file)", "os.replace(a, b)", "torch.save(x, path)", "zipfile.ZipFile(p, 'w')"],
+     "figure.savefig(path)", "json.dump(x, file)", "os.replace(a, b)", "torch.save(x, path)",
+     "zipfile.ZipFile(p, 'w')"],
 )  # fmt: skip
 def test_it_would_be_found(text):
     assert list(calls(text))

@@ -46,8 +46,8 @@ def export(
         environment: in which the model of a .zip was trained, by id.
         overwrite: replace files in the folder that this command did not write.
     """
+    policy = _policy(source, last, trust, statistics, algorithm, action_mode, environment)
     with Outputs("export", folder=out, inputs=[source, statistics], overwrite=overwrite) as outputs:
-        policy = _policy(source, last, trust, statistics, algorithm, action_mode, environment)
         policy.save(out)
         if onnx and _onnx_installed():
             from ..export.onnx_file import write_onnx

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import shlex
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -63,34 +65,55 @@ def tune_baselines(
     command += f" --env {environment}" if environment != ENVIRONMENT else ""
     command += f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else ""
     best_first: dict[str, list[Try]] = {}
-    done: dict[str, list[Try]] = {}
     files = [OutputFile("--out", best, NUMBERS), OutputFile("--out", table, TABLE)]
     with Outputs("tune-baselines", files=files, inputs=[population, exoskeleton], overwrite=overwrite) as outputs:
-        try:
-            with tqdm(total=len(tunable()) * tries, unit="try", leave=False, disable=None, file=sys.stderr) as bar:
-
-                def progress(one: Try) -> None:
-                    done.setdefault(one.policy, []).append(one)
-                    bar.set_description(one.policy)
-                    bar.update()
-
-                for name in tunable():
-                    best_first[name] = tune(
-                        name, tries, patients, seed, population=population, workers=workers, progress=progress,
-                        environment=environment, repetitions=repetitions, **settings,
-                    )  # fmt: skip
-        except KeyboardInterrupt:
-            if not done:
-                raise
-            write_text(part := partial(table), _table(done, command))
-            count = sum(map(len, done.values()))
-            raise Stopped(f"{count} of {len(tunable()) * tries} tries are in '{outputs.where(part)}'.") from None
+        tried = _Tried(tries, table, command)
+        with tried.kept_when_stopped(outputs):
+            for name in tunable():
+                best_first[name] = tune(
+                    name, tries, patients, seed, population=population, workers=workers, progress=tried.add,
+                    environment=environment, repetitions=repetitions, **settings,
+                )  # fmt: skip
         write_text(best, _yaml(best_first, population, command))
         write_text(table, _table(best_first, command))
     for name, ranked in best_first.items():
         print(f"{name:18} return {ranked[0].measures['return']:.1f}  {ranked[0].numbers}")
     print(f"written: {outputs.moved or folder}")
     return FAILED_RUN if outputs.failed else 0
+
+
+class _Tried:
+    """Tries as they are done, with a bar.
+
+    Args:
+        tries: of each policy.
+        table: file of all tries.
+        command: as it stands in the table.
+    """
+
+    def __init__(self, tries: int, table: Path, command: str) -> None:
+        self.total, self.table, self.command = len(tunable()) * tries, table, command
+        self.done: dict[str, list[Try]] = {}
+        self.bar = tqdm(total=self.total, unit="try", leave=False, disable=None, file=sys.stderr)
+
+    def add(self, one: Try) -> None:
+        """One more."""
+        self.done.setdefault(one.policy, []).append(one)
+        self.bar.set_description(one.policy)
+        self.bar.update()
+
+    @contextlib.contextmanager
+    def kept_when_stopped(self, outputs: Outputs) -> Iterator[None]:
+        """Within, Ctrl-C writes the tries so far."""
+        try:
+            with self.bar:
+                yield
+        except KeyboardInterrupt:
+            if not self.done:
+                raise
+            write_text(part := partial(self.table), _table(self.done, self.command))
+            count = sum(map(len, self.done.values()))
+            raise Stopped(f"{count} of {self.total} tries are in '{outputs.where(part)}'.") from None
 
 
 def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:

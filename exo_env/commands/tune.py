@@ -31,8 +31,9 @@ def tune(
         overwrite: replace files in the folder that this command did not write.
     """
     require_matplotlib()
+    device = Exoskeleton.named(exoskeleton)
     with Outputs("tune", folder=out, inputs=[exoskeleton], overwrite=overwrite) as outputs:
-        _tune(out, Exoskeleton.named(exoskeleton))
+        _tune(out, device)
     print(f"written: {outputs.where(out)}")
     return FAILED_RUN if outputs.failed else 0
 

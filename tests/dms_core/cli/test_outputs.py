@@ -344,11 +344,21 @@ class TestFolder:
         assert done.failed and (out / "b.csv").read_text() == "precious"
         assert (done.where(out) / "b.csv").read_text() == "2" and "was not written by `test`" in capsys.readouterr().err
 
-    def test_it_holds_no_input(self, tmp_path):
-        (tmp_path / "me.yaml").write_text("precious")
-        for inputs in (["me.yaml", str(tmp_path / "me.yaml")], [tmp_path]):
-            with pytest.raises(InputError, match="holds the input"):
+    def test_it_is_no_input(self, tmp_path):
+        with outputs(folder=tmp_path):
+            write_text(tmp_path / "policy.json", "precious")
+        for inputs in ([str(tmp_path / "policy.json")], [tmp_path]):
+            with pytest.raises(InputError, match="is the input"):
                 outputs(folder=tmp_path, inputs=inputs, overwrite=True)
+
+    def test_an_input_beside_the_outputs_is_never_one(self, tmp_path, elsewhere):
+        (tmp_path / "me.yaml").write_text("precious")
+        (tmp_path / "table.csv").symlink_to("me.yaml")
+        with outputs(folder=tmp_path, inputs=[str(tmp_path / "me.yaml")], overwrite=True) as done:
+            write_text(tmp_path / "other.csv", "1")
+            write_text(tmp_path / "table.csv", "2")
+        assert done.failed and (tmp_path / "me.yaml").read_text() == "precious"
+        assert (tmp_path / "other.csv").read_text() == "1" and (done.where(tmp_path) / "table.csv").read_text() == "2"
 
     @pytest.mark.parametrize(
         "content", ["", "[" * 100_000, "[]", "null", '{"command": "test"}', '{"command": "test", "files": 3}']
