@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 
 from dms_core.errors import InputError
-from dms_core.output_place import Content, check_writable, put
+from dms_core.output_place import Content, check_kind, put
 from dms_core.outputs import active_outputs
 
 DIGITS = ".12g"
@@ -34,12 +34,12 @@ def write_file(path: str | Path, content: Content) -> None:
         content: writes into an open binary file; may be called again for another place.
 
     Raises:
-        InputError: the place cannot be written.
-        OSError: the disk is full; what was there before is still there.
+        InputError: what is there must not be replaced.
+        OSError: the disk is full or cannot be written; what was there before is still there.
     """
     outputs = active_outputs()
     if outputs is None:
-        put(check_writable(path), content)
+        put(check_kind(path), content)
     else:
         outputs.write(Path(path), content)
 

@@ -41,23 +41,33 @@ def check_writable(path: str | Path) -> Path:
     Raises:
         InputError: names the place and the reason.
     """
+    path = check_kind(path)
+    mode = _mode(path)
+    if descriptor(path) is None and (mode is None or stat.S_ISREG(mode)):
+        _check_parent(path, Path(os.path.realpath(path)))
+    return path
+
+
+def check_kind(path: str | Path) -> Path:
+    """The path, if what is there may be replaced or written through.
+
+    Raises:
+        InputError: it is a folder, a socket, a disk, or read-only.
+    """
     path = Path(path)
     mode = _mode(path)
     if mode is not None and stat.S_ISDIR(mode):
         raise InputError(f"output '{path}' is a folder; give the name of a file in it.")
-    if mode is not None and _through(mode):
+    if mode is None or _through(mode) or descriptor(path) is not None:
         return path
-    if mode is not None and not stat.S_ISREG(mode):
+    if not stat.S_ISREG(mode):
         raise InputError(
             f"output '{path}' is a socket or a disk: expected a file, a pipe or a device such as /dev/null."
         )
-    if descriptor(path) is not None:
-        return path
-    if mode is not None and not (mode & 0o222 and os.access(path, os.W_OK)):
+    if not (mode & 0o222 and os.access(path, os.W_OK)):
         raise InputError(
             f"output '{path}' is read-only (mode {mode & 0o777:03o}); allow writing or choose another place."
         )
-    _check_parent(path, Path(os.path.realpath(path)))
     return path
 
 
@@ -91,7 +101,9 @@ def put(path: Path, content: Content) -> None:
             with open(path, "wb") as file:
                 content(file)
         else:
-            _replace(Path(os.path.realpath(path)), content)
+            target = Path(os.path.realpath(path))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _replace(target, content)
     except OSError as error:
         # The error may name our temporary file, or none.
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None

@@ -14,7 +14,7 @@ from tyro.conf import arg
 
 from dms_core.command_line import STOPPED, FolderOut
 from dms_core.config_files import configs
-from dms_core.errors import InputError
+from dms_core.errors import InputError, Stopped
 
 from ..environment import PROGRAM, environment_id
 from ..evaluation.episode import judged
@@ -50,11 +50,14 @@ def train(
 
     with _stopping() as stop:
         folder, used, seed = _begun(config, seed, changes, out, resume, environment)
-        with folder.locked(), _bar(used.n_timesteps) as report:
-            run = TrainingRun(folder, used, seed, report, judged, stop)
-            for line in _outlook(run.steps, run.end, used.n_timesteps):
-                tqdm.write(line)
-            done = run.run()
+        try:
+            with folder.locked(), _bar(used.n_timesteps) as report:
+                run = TrainingRun(folder, used, seed, report, judged, stop)
+                for line in _outlook(run.steps, run.end, used.n_timesteps):
+                    tqdm.write(line)
+                done = run.run()
+        except KeyboardInterrupt:
+            raise Stopped(f"at once; what was saved before is in '{folder.path}'.") from None
     if not done:
         stopped = f"stopped after {run.steps} steps, an unfinished round is dropped"
         print(f"{stopped}; go on with: {PROGRAM} train --resume {folder.path}")

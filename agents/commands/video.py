@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Annotated, Any
 
@@ -68,11 +68,18 @@ def video(
     with Outputs("video", files=[file], inputs=inputs, overwrite=overwrite) as outputs:
         stages = [Stage(policy, patient, seed, environment, **settings) for policy in used]
         rate, total = stages[0].rate, stages[0].length
+        drawn = 0
         with tqdm(total=total, unit="picture", leave=False, disable=None) as bar:
+
+            def progress() -> None:
+                nonlocal drawn
+                drawn += 1
+                bar.update()
+
             try:
-                _write(out, _shown(pictures(stages), bar, GIF_STEP if out.suffix == ".gif" else 1), rate)
+                _write(out, _shown(pictures(stages), progress, GIF_STEP if out.suffix == ".gif" else 1), rate)
             except KeyboardInterrupt:
-                raise Stopped(f"{bar.n} of {total} pictures were drawn; nothing was written.") from None
+                raise Stopped(f"{drawn} of {total} pictures were drawn; nothing was written.") from None
     print(f"written: {outputs.where(out)}")
     return FAILED_RUN if outputs.failed else 0
 
@@ -137,10 +144,10 @@ def band(width: int, title: str, event: str) -> np.ndarray:
     return pygame.surfarray.array3d(surface).swapaxes(0, 1)
 
 
-def _shown(whole: Iterator[np.ndarray], bar: tqdm, every: int) -> Iterator[np.ndarray]:
-    """Every so many pictures, with the bar moved."""
+def _shown(whole: Iterator[np.ndarray], progress: Callable[[], None], every: int) -> Iterator[np.ndarray]:
+    """Every so many pictures; `progress` is called with each of them all."""
     for k, picture in enumerate(whole):
-        bar.update()
+        progress()
         if k % every == 0:
             yield picture
 

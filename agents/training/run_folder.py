@@ -23,7 +23,8 @@ from typing import Any
 import yaml
 
 from dms_core.errors import InputError
-from dms_core.output_file import check_writable, write_json, write_text
+from dms_core.output_file import write_json, write_text
+from dms_core.output_place import check_writable
 
 from ..checkpoint import Store
 from ..environment import environment_id
