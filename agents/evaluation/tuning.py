@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ POPULATION, STREAM = "mixed", 2**32
 """Training population by default; STREAM is added to a seed, so that no patients are those of an evaluation with it."""
 SPREAD = 0.1
 """Standard deviation around the best, as a share of each range."""
+FORGETTING = 0.5
+"""In which a pool forgets the tries that it has not begun [s]."""
 BATCH = 8
 """Tries of the second half that go out from the same best one."""
 MEASURED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N", "unsafe")
@@ -134,6 +137,8 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             yield pool
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
+            # Its thread reports a traceback where a process ends while it still knows tries that were cancelled.
+            time.sleep(FORGETTING)
             for child in set(multiprocessing.active_children()) - before:
                 child.kill()
             raise

@@ -96,8 +96,10 @@ class TrainingRun:
         """
         left = self.config.n_timesteps - self.steps
         self._began = time.perf_counter() - self.seconds
+        logger = None
         try:
-            self.model.set_logger(configure(str(self.folder.path / "tensorboard"), ["tensorboard"]))
+            logger = configure(str(self.folder.path / "tensorboard"), ["tensorboard"])
+            self.model.set_logger(logger)
             if left > 0:
                 self.model.learn(left, callback=_Watch(self), reset_num_timesteps=False)
             done = self.steps >= self.config.n_timesteps
@@ -115,7 +117,8 @@ class TrainingRun:
             worlds = self.model.get_env()
             if worlds is not None:
                 worlds.close()
-            self.model.logger.close()
+            if logger is not None:
+                logger.close()
         return done
 
     def evaluate(self) -> None:
