@@ -6,7 +6,6 @@ only then does `latest` name it. Whatever happens in between, `latest` names a w
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -14,11 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dms_core.errors import InputError
-from dms_core.output_file import whole_file
+from dms_core.output_file import write_text
+from dms_core.outputs import digest
 
 POINTER, HASHES = "latest", "hashes.json"
-BLOCK = 1 << 20
-"""Read at once [byte]."""
 
 
 class Store:
@@ -50,14 +48,13 @@ class Store:
         part.mkdir(parents=True)
         try:
             write(part)
-            (part / HASHES).write_text(json.dumps({f.name: digest(f) for f in sorted(part.iterdir())}, indent=2))
+            write_text(part / HASHES, json.dumps({f.name: digest(f) for f in sorted(part.iterdir())}, indent=2))
             for file in part.iterdir():
                 _to_disk(file)
             part.rename(path)
         finally:
             shutil.rmtree(part, ignore_errors=True)
-        with whole_file(self.folder / POINTER) as file_:
-            file_.write(f"{name}\n")
+        write_text(self.folder / POINTER, f"{name}\n")
         _to_disk(self.folder)
         self._tidy(name)
         return path
@@ -100,15 +97,6 @@ class Store:
         for path in folders:
             if path not in whole[-self.keep :]:
                 shutil.rmtree(path, ignore_errors=True)
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file."""
-    hashed = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(BLOCK):
-            hashed.update(block)
-    return hashed.hexdigest()
 
 
 def _to_disk(path: Path) -> None:

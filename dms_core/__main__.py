@@ -1,13 +1,14 @@
 """Command line of the DMS platform: check, run and describe model files.
 
 python -m dms_core check MODEL.yaml
-python -m dms_core run MODEL.yaml --t-end T --rtol R [--sample DT] --out FILE.csv [--stats FILE.json]
-python -m dms_core schema [--out FILE]
+python -m dms_core run MODEL.yaml --t-end T --rtol R [--sample DT] --out FILE.csv [--stats FILE.json] [--overwrite]
+python -m dms_core schema [--out FILE] [--overwrite]
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -15,12 +16,23 @@ import numpy as np
 from tyro.conf import Positional, arg
 
 from dms_core import Model, Simulation, SolverOptions, Trajectory
-from dms_core.command_line import FAILED_RUN, bar_of_run, moves, run_command
-from dms_core.errors import DmsError, InputError
+from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_command
+from dms_core.errors import DmsError, InputError, Stopped
 from dms_core.model_file import load
-from dms_core.output_file import check_writable, whole_file, with_unit, write_csv, write_json
-from dms_core.results import States
+from dms_core.output_file import check_columns, check_size, with_unit, write_csv, write_json, write_text
+from dms_core.output_place import descriptor
+from dms_core.outputs import OutputFile, Outputs, partial
+from dms_core.results import Result, States
 from dms_core.schema import reference
+
+TABLE, STATISTICS, REFERENCE = (
+    rb"\Atime_s,.*\bq\.",
+    rb'\A\{\s+"result": "',
+    rb"\A# Model files\s+Generated from the code",
+)
+"""Marks of files that the commands wrote, as regular expressions."""
+ROWS = 10_000
+"""Rows of a table in memory at once."""
 
 
 def check(model: Positional[Path]) -> int:
@@ -67,17 +79,19 @@ def report(model: Model) -> str:
 def run(
     model: Positional[Path],
     t_end: float,
-    out: Path,
+    out: FileOut,
     rtol: float = SolverOptions.rtol,
     atol: float | None = None,
     sample: float | None = None,
-    stats: Path | None = None,
+    stats: FileOut | None = None,
     step: float | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Run a model file from its assembled start and write sensors, coordinates and rates as CSV.
 
     Without --sample the rows are the solver's own steps; at a jump of an input a time stands twice, with the values
-    before and behind it. A run that stops early writes what it has and ends with status 1.
+    before and behind it. A run that stops early writes what it has and ends with status 1; one that is
+    stopped by Ctrl-C writes it under a name with 'partial' in it and ends with status 130.
 
     Args:
         model: model file (YAML).
@@ -89,6 +103,7 @@ def run(
         stats: JSON file for the solver's statistics.
         step: constant step [s], at most t_end, instead of error control; rtol then only sets how far Newton's method
             goes. Where t_end is no multiple of it, the last step is shorter, and the message says so.
+        overwrite: replace files of these names that this command did not write.
     """
     if not (np.isfinite(t_end) and t_end > 0.0):
         raise InputError(f"--t-end: Expected a positive time [s], got {t_end}.")
@@ -101,58 +116,77 @@ def run(
         if value is not None and value > t_end:
             raise InputError(f"{name}: Expected at most --t-end = {t_end} s, got {value} s.")
     options = SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
-    for path in (out, stats):
-        if path is not None:
-            check_writable(path)
-    simulation = Simulation(compiled(model), options)
-    with bar_of_run(t_end) as bar:
-        simulation.advance(t_end, moves(bar))
-    trajectory = simulation.trajectory()
-    write_csv(out, table(trajectory, sample))
-    summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
-    if stats is not None:
-        write_json(stats, {**summary, "flags": [flag.as_dict() for flag in trajectory.flags]})
+    files = [OutputFile("--out", out, TABLE)]
+    files += [] if stats is None else [OutputFile("--stats", stats, STATISTICS)]
+    with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
+        made = compiled(model)
+        check_columns(names := heads(made))
+        for option, time in (("--sample", sample), ("--step", step)):
+            if time is not None:
+                check_size(option, t_end, time, len(names))
+        simulation = Simulation(made, options)
+        with bar_of_run(t_end) as bar:
+            simulation.advance(t_end, moves(bar))
+        trajectory = simulation.trajectory()
+        if trajectory.result is Result.INTERRUPTED:
+            write_csv(part := partial(out), lambda: table(trajectory, sample))
+            raise Stopped(f"{trajectory.t[-1]:.4g} of {t_end:.4g} s are in '{outputs.where(part)}'.")
+        write_csv(out, lambda: table(trajectory, sample))
+        summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
+        if stats is not None:
+            write_json(stats, {**summary, "flags": [flag.as_dict() for flag in trajectory.flags]})
+    # A table on standard output shall be nothing but a table.
+    lines = sys.stdout if descriptor(out) is None else sys.stderr
     for key, value in summary.items():
-        print(
-            f"{key.replace('_', ' ')}: {value:.4g}" if isinstance(value, float) else f"{key.replace('_', ' ')}: {value}"
-        )
-    print(f"written: {out}")
+        shown = f"{value:.4g}" if isinstance(value, float) else value
+        print(f"{key.replace('_', ' ')}: {shown}", file=lines)
+    print(f"written: {outputs.where(out)}", file=lines)
     if not trajectory.success:
-        print(f"The run failed: {trajectory.message} '{out}' holds the part before.", file=sys.stderr)
+        print(f"The run failed: {trajectory.message} '{outputs.where(out)}' holds the part before.", file=sys.stderr)
         return FAILED_RUN
-    return 0
+    return FAILED_RUN if outputs.failed else 0
 
 
-def table(trajectory: Trajectory, sample: float | None) -> dict[str, np.ndarray]:
-    """Columns of a run: time, sensors with their unit, coordinates 'q.*' and their rates 'v.*'.
+def table(trajectory: Trajectory, sample: float | None) -> Iterator[dict[str, np.ndarray]]:
+    """Columns of a run, in parts one below the other.
 
     Args:
         trajectory: a finished or interrupted run.
         sample: time between rows [s]; None for the solver's own steps.
     """
-    states = trajectory.own_steps()
-    if sample is not None and len(trajectory.t) > 1:
-        states = trajectory.at(trajectory.grid(sample))
-    return columns(states)
+    if sample is None or len(trajectory.t) == 1:
+        yield columns(trajectory.own_steps())
+        return
+    times = trajectory.grid(sample)
+    for k in range(0, len(times), ROWS):
+        yield columns(trajectory.at(times[k : k + ROWS]))
+
+
+def heads(model: Model) -> list[str]:
+    """Names of the columns: time, sensors with their unit, coordinates 'q.*' and their rates 'v.*'."""
+    layout = model.layout
+    coordinates = [f"{kind}.{name}" for kind in "qv" for name in layout.names]
+    return ["time_s", *(with_unit(name, unit) for name, unit in layout.outputs), *coordinates]
 
 
 def columns(states: States) -> dict[str, np.ndarray]:
     """Columns of given states."""
-    layout, measured = states.model.layout, states.sensors()
-    found = {"time_s": states.t}
-    found |= {with_unit(name, unit): measured[name] for name, unit in layout.outputs}
-    found |= {f"q.{name}": states.q[:, k] for k, name in enumerate(layout.names)}
-    return found | {f"v.{name}": states.v[:, k] for k, name in enumerate(layout.names)}
+    measured = states.sensors()
+    found = [states.t, *(measured[name] for name, _ in states.model.layout.outputs), *states.q.T, *states.v.T]
+    return dict(zip(heads(states.model), found, strict=True))
 
 
-def schema(out: Annotated[Path | None, arg(help="file to write; default: standard output")] = None) -> int:
+def schema(
+    out: Annotated[FileOut | None, arg(help="file to write; default: standard output")] = None,
+    overwrite: Annotated[bool, arg(help="replace a file of this name that this command did not write")] = False,
+) -> int:
     """Print the reference of model files: every kind with its keys, units and defaults (Markdown)."""
     if out is None:
         print(reference(), end="")
         return 0
-    with whole_file(out) as file:
-        file.write(reference())
-    return 0
+    with Outputs("schema", files=[OutputFile("--out", out, REFERENCE)], overwrite=overwrite) as outputs:
+        write_text(out, reference())
+    return FAILED_RUN if outputs.failed else 0
 
 
 def main(arguments: list[str] | None = None) -> int:

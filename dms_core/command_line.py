@@ -4,18 +4,43 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import tyro
 from tqdm import tqdm
+from tyro.constructors import PrimitiveConstructorSpec
 
 from dms_core.errors import DmsError, InputError, ModelWarning
+from dms_core.output_place import REMEDIES
 
-USER_MISTAKE, FAILED_RUN = 2, 1
+USER_MISTAKE, FAILED_RUN, STOPPED = 2, 1, 130
 """Exit statuses."""
+
+
+def _place(kind: str, metavar: str) -> PrimitiveConstructorSpec[Path]:
+    """How an option is read that says where to write."""
+
+    def read(given: list[str]) -> Path:
+        (text,) = given
+        if not text or "\0" in text:
+            raise InputError(f"Expected the name of a {kind}, got {text!r}.")
+        if kind == "file" and text.endswith(("/", os.sep)):
+            raise InputError(f"Expected the name of a file, got that of a folder, '{text}'.")
+        return Path(text)
+
+    return PrimitiveConstructorSpec(1, metavar, read, lambda x: isinstance(x, Path), lambda x: [str(x)])
+
+
+FileOut = Annotated[Path, _place("file", "FILE")]
+"""Option that names a file to write."""
+FolderOut = Annotated[Path, _place("folder", "DIR")]
+"""Option that names a folder to write into."""
 LONG_RUN = 2.0
 """Seconds after which a run shows a progress bar."""
 BAR = "{percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
@@ -41,17 +66,43 @@ def run_command(
     """Run one of the commands; a mistake of the user is one message on stderr and status 2."""
     try:
         _check_options(sys.argv[1:] if arguments is None else arguments)
-        with _sentences_of_warnings():
+        with _sentences_of_warnings(), _terminated_as_interrupted():
             status = tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=description, args=arguments)
         sys.stdout.flush()
         return status
     except DmsError as error:
         print(f"error: {error}", file=sys.stderr)
         return USER_MISTAKE
+    except KeyboardInterrupt as stop:
+        print(f"stopped: {str(stop) or 'nothing was written.'}", file=sys.stderr)
+        return STOPPED
     except BrokenPipeError:
         # The reader (head, less) has seen enough; what is left to flush at exit must not complain either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        where = f"'{error.filename}': " if error.filename is not None else ""
+        advice = f"; {REMEDIES[error.errno]}" if error.errno in REMEDIES else ""
+        print(f"error: {where}{error.strerror or error}{advice}.", file=sys.stderr)
+        return FAILED_RUN
+
+
+@contextlib.contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Within, SIGTERM stops as Ctrl-C does: what is done is kept, and nothing half written is left."""
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
+        yield
+        return
+
+    def stop(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextlib.contextmanager

@@ -37,6 +37,10 @@ class SimulationError(DmsError, RuntimeError):
     """A run failed and the caller asked for an exception instead of a result code."""
 
 
+class Stopped(KeyboardInterrupt):
+    """The user stopped a command (Ctrl-C); the message says what was done and what is kept."""
+
+
 class ModelWarning(UserWarning):
     """A model that can be run, but is hardly what its author meant."""
 

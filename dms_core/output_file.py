@@ -1,89 +1,166 @@
-"""Writing results whole or not at all: the place is tried before a run, and a file appears only when it is complete."""
+"""Writing results: every file of the three packages is written by `write_file` or by what stands on it."""
 
 from __future__ import annotations
 
 import contextlib
+import csv
+import io
 import json
-import os
-import tempfile
-from collections.abc import Iterator, Mapping
+import math
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from dms_core.errors import InputError
+from dms_core.output_place import Content, check_kind, put
+from dms_core.outputs import active_outputs
 
 DIGITS = ".12g"
 """Format of numbers in tables: more digits than any tolerance in use, fewer than rounding shows."""
+LARGEST_TABLE = 2**29
+"""Numbers of a table in memory [byte]; as text they take about twice as much."""
 
 
-def check_writable(path: str | Path) -> Path:
-    """The path, if a file can be written there; missing folders are made. Call it before a long run.
+def write_file(path: str | Path, content: Content) -> None:
+    """Write a file whole or not at all.
+
+    Within a command's `Outputs`, what cannot be written at its place is kept elsewhere.
+
+    Args:
+        path: of the file; its folder is made where it is missing.
+        content: writes into an open binary file; may be called again for another place.
 
     Raises:
-        InputError: names the folder and the reason.
+        InputError: what is there must not be replaced.
+        OSError: the disk is full or cannot be written; what was there before is still there.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"output '{path}' is a folder; give the name of a file in it.")
-    if path.parent.exists() and not path.parent.is_dir():
-        raise InputError(f"output '{path}': '{path.parent}' is a file, not a folder; choose another place.")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Permission bits tell root nothing and network drives lie; only writing shows that writing works.
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"output '{path}': the folder '{path.parent}' cannot be written ({error.strerror}); choose another place."
-        ) from None
-    return path
+    outputs = active_outputs()
+    if outputs is None:
+        put(check_kind(path), content)
+    else:
+        outputs.write(Path(path), content)
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write bytes, see `write_file`."""
+    write_file(path, lambda file: file.write(content))
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write text as UTF-8, see `write_file`; what UTF-8 cannot say (half of a surrogate pair) is escaped."""
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[IO[str]]:
-    """A text file that takes its name only when the block ends without an exception.
+    """A text that becomes a file when the block ends without an exception, see `write_file`."""
+    text = io.StringIO(newline="\n")
+    yield text
+    write_text(path, text.getvalue())
+
+
+def write_csv(
+    path: str | Path, columns: Mapping[str, np.ndarray] | Callable[[], Iterable[Mapping[str, np.ndarray]]]
+) -> None:
+    """A table: one line of names, then one line a row.
+
+    Names with commas or quotes are quoted (RFC 4180).
+
+    Args:
+        path: of the file.
+        columns: by name, shape (n,) each; or a function that gives the same in parts, one below the other.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: a name holds a line break.
     """
-    path = check_writable(path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", text=True)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            yield file
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+
+    def content(file: IO[bytes]) -> None:
+        for k, part in enumerate((columns,) if isinstance(columns, Mapping) else columns()):
+            if k == 0:
+                file.write(_head(list(part)))
+            table = np.column_stack([np.asarray(column, float) for column in part.values()])
+            file.writelines((",".join(format(x, DIGITS) for x in row) + "\n").encode("ascii") for row in table)
+
+    write_file(path, content)
 
 
-def _umask() -> int:
-    """Permission bits that new files do not get; it can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def check_columns(names: Iterable[str]) -> None:
+    """Refuse names that cannot head a table, before the run whose table it is.
+
+    Raises:
+        InputError: a name holds a line break or another character that cannot be printed, or stands twice.
+    """
+    seen: set[str] = set()
+    for name in names:
+        if any(map(_controls, name)):
+            raise InputError(f"column {name!r}: expected a name without line breaks and other control characters.")
+        if name in seen:
+            raise InputError(f"column '{name}' would stand twice in the table; give the sensor another name.")
+        seen.add(name)
 
 
-def write_csv(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
-    """A table: one line of names, then one line a row. All columns have shape (n,)."""
-    table = np.column_stack([np.asarray(column, float) for column in columns.values()])
-    with whole_file(path) as file:
-        file.write(",".join(columns) + "\n")
-        for row in table:
-            file.write(",".join(format(x, DIGITS) for x in row) + "\n")
+def check_size(option: str, seconds: float, sample: float, columns: int) -> None:
+    """Refuse a table that would be too large, before the run.
+
+    Args:
+        option: that decides the number of rows, as '--sample'.
+        seconds: of the run [s].
+        sample: time between rows [s].
+        columns: numbers a row.
+
+    Raises:
+        InputError: says how large the table would be and what is allowed.
+    """
+    size = (seconds / sample + 1.0) * columns * 8.0
+    if size > LARGEST_TABLE:
+        rows = LARGEST_TABLE // (8 * columns) - 1
+        raise InputError(
+            f"{option} {sample:g}: {seconds / sample:.3g} rows of {columns} numbers take {size / 2**30:.3g} GiB. "
+            f"Expected at least {seconds / rows:.3g} s, for a table of at most {LARGEST_TABLE / 2**30:g} GiB."
+        )
+
+
+def _head(names: list[str]) -> bytes:
+    """The first line."""
+    check_columns(names)
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(names)
+    return line.getvalue().encode("utf-8", "backslashreplace")
 
 
 def write_json(path: str | Path, content: Any) -> None:
-    """Indented JSON."""
-    with whole_file(path) as file:
-        json.dump(content, file, indent=2)
-        file.write("\n")
+    """Indented JSON; JSON has no NaN: what is not finite is null."""
+    write_text(path, json.dumps(_finite(content), indent=2, allow_nan=False) + "\n")
+
+
+def _finite(value: Any) -> Any:
+    """A copy with None for numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def with_unit(name: str, unit: str) -> str:
     """Name of a column: 'elbow.rate' in 'rad/s' is 'elbow.rate_rad_per_s'; numbers without unit keep their name."""
     plain = unit.replace("/", "_per_").replace("^", "").replace(" ", "")
     return f"{name}_{plain}" if plain not in ("", "-") else name
+
+
+def one_line(text: str) -> str:
+    """A text whose line breaks and other control characters are escaped, for a comment or a heading."""
+    return "".join(x.encode("unicode_escape").decode("ascii") if _controls(x) else x for x in text)
+
+
+def _controls(character: str) -> bool:
+    """Whether it breaks a line, controls a terminal, or is half a character."""
+    return unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp")
+
+
+def markdown_cell(text: str) -> str:
+    """A text as cell of a Markdown table: a bar would end it."""
+    return one_line(text).replace("|", "\\|")

@@ -114,7 +114,13 @@ class Trajectory:
         return self.result is Result.SUCCESS
 
     def check(self) -> Trajectory:
-        """This trajectory, or SimulationError with the result's sentence when the run failed."""
+        """This trajectory, or SimulationError with the result's sentence when the run failed.
+
+        Raises:
+            KeyboardInterrupt: the user stopped it.
+        """
+        if self.result is Result.INTERRUPTED:
+            raise KeyboardInterrupt
         if not self.success:
             raise SimulationError(self.message)
         return self

@@ -6,6 +6,8 @@ python -m exo_env tune --out DIR [--exoskeleton NAME|FILE.yaml]
 python -m exo_env arm26 --excitations FILE.csv --start-deg D --start-activation A --t-end T --rtol R --sample DT
                         --out FILE.csv
 python -m exo_env soak --steps N [--env ID] [--exoskeleton NAME|FILE.yaml]
+
+Every command that writes --out renews what it wrote itself; what others wrote it replaces with --overwrite only.
 """
 
 from __future__ import annotations

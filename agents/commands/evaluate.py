@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-import math
+import dataclasses
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from tqdm import tqdm
 from tyro.conf import arg
 
-from dms_core.errors import DmsError, InputError
-from dms_core.output_file import check_writable, whole_file, write_json
+from dms_core.command_line import FAILED_RUN, FolderOut
+from dms_core.errors import DmsError, InputError, Stopped
+from dms_core.output_file import write_json, write_text
+from dms_core.outputs import Outputs, partial
 from exo_env.rendering.panels import require_matplotlib
 
 from ..environment import ENVIRONMENT, environment_id
-from ..evaluation.evaluate import Plan, episodes_of, results_of
+from ..evaluation.evaluate import Plan, each_episode_of, results_of
 from ..evaluation.figure import draw
 from ..evaluation.tables import heading, left_out_lines, short_table, statistic, whole_table
 from ..policies.baselines import POLICIES
 from ..policies.learned import find_policy, shipped_policies
+from ..policies.policy import Policy
 from .options import device_settings, repeated
+
+EVALUATION = "evaluation.json"
 
 
 def evaluate(
     policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
-    out: Path,
+    out: FolderOut,
     population: str = "evaluation",
     patients: int = 20,
     seed: int = 0,
@@ -34,6 +40,7 @@ def evaluate(
     exoskeleton: str | None = None,
     workers: Literal["here", "ray"] = "here",
     address: str | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Run policies on the same patients: a table, evaluation.json, evaluation.md and, with matplotlib, evaluation.png.
 
@@ -49,6 +56,7 @@ def evaluate(
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
         workers: 'ray' shares the episodes out, with the same results to the last bit.
         address: of a Ray cluster; a local one is started where it is not given.
+        overwrite: replace files in the folder that this command did not write.
     """
     if len(set(policy_names)) < max(len(policy_names), 1):
         raise InputError(f"--policy {' '.join(policy_names)}: expected one or more different names.")
@@ -57,26 +65,62 @@ def evaluate(
     used = [find_policy(name) for name in policy_names]
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     plan = Plan(population, patients, seed, loads, environment, settings)
-    check_writable(out / "evaluation.json")
-    with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
+    inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    with Outputs("evaluate", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
+        with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
 
-        def progress(name: str) -> None:
-            bar.set_description(name)
-            bar.update()
+            def progress(name: str) -> None:
+                bar.set_description(name)
+                bar.update()
 
-        if workers == "ray":
-            from ..distributed.shared_evaluation import shared_out
+            if workers == "ray":
+                from ..distributed.shared_evaluation import shared_out
 
-            results = shared_out(used, plan, address=address, progress=progress)
-        else:
-            results = results_of(used, [episodes_of(one, plan, plan.cases, progress) for one in used], plan)
-    write_json(out / "evaluation.json", _json(results))
-    _draw(out / "evaluation.png", results)
-    with whole_file(out / "evaluation.md") as file:
-        file.write("\n".join(whole_table(results)))
+                results = shared_out(used, plan, address=address, progress=progress)
+            else:
+                results = results_of(used, _episodes(used, plan, progress, out / EVALUATION), plan)
+        write_json(out / EVALUATION, results)
+        write_text(out / "evaluation.md", "\n".join(whole_table(results)))
+        _draw(out / "evaluation.png", results)
     print("\n".join([heading(results), statistic(results), *left_out_lines(results), "", short_table(results), ""]))
-    print(f"written: {out} (all measures: evaluation.md, all episodes: evaluation.json)")
-    return 0
+    print(f"written: {outputs.where(out)} (all measures: evaluation.md, all episodes: {EVALUATION})")
+    return FAILED_RUN if outputs.failed else 0
+
+
+def _episodes(
+    used: Sequence[Policy], plan: Plan, progress: Callable[[str], None], path: Path
+) -> list[list[dict[str, Any]]]:
+    """Episodes of each policy.
+
+    Raises:
+        Stopped: by the user; what is done is written beside `path`.
+    """
+    done: list[list[dict[str, Any]]] = []
+    try:
+        for one in used:
+            done.append([])
+            for episode in each_episode_of(one, plan, plan.cases):
+                done[-1].append(episode)
+                progress(one.name)
+    except KeyboardInterrupt:
+        raise Stopped(_kept(used, done, plan, path)) from None
+    return done
+
+
+def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, path: Path) -> str:
+    """Write the policies that are done, or whole patients of the first one; says so in a sentence."""
+    cases = len(plan.cases)
+    whole = [episodes for episodes in done if len(episodes) == cases]
+    if not whole:
+        a_patient = max(len(plan.loads), 1)
+        patients = len(done[0]) // a_patient
+        if patients == 0:
+            return "no patient was done; nothing was written."
+        whole, plan = [done[0][: patients * a_patient]], dataclasses.replace(plan, patients=patients)
+    part = partial(path)
+    write_json(part, results_of(used[: len(whole)], whole, plan))
+    names = ", ".join(one.name for one in used[: len(whole)])
+    return f"{plan.patients} patients with {names} are in '{part}'."
 
 
 def _draw(path: Path, results: dict[str, Any]) -> None:
@@ -84,8 +128,6 @@ def _draw(path: Path, results: dict[str, Any]) -> None:
     try:
         require_matplotlib()
     except DmsError as error:
-        # One of an earlier run would be of other episodes.
-        path.unlink(missing_ok=True)
         print(f"{path.name} is left out: {error}")
     else:
         draw(path, results)
@@ -99,12 +141,3 @@ def policies() -> int:
         one = find_policy(name)
         print(f"{name:18} {one.title}; action mode {one.action_mode}, sees {', '.join(one.observation)}")
     return 0
-
-
-def _json(value: Any) -> Any:
-    """JSON has no NaN: what could not be measured is null."""
-    if isinstance(value, dict):
-        return {k: _json(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_json(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

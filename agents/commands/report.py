@@ -8,8 +8,10 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
+from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError
-from dms_core.output_file import check_writable, whole_file
+from dms_core.output_file import markdown_cell, one_line, write_text
+from dms_core.outputs import Outputs
 from exo_env.patient.population import population, shipped_populations
 from exo_env.rendering.panels import require_matplotlib
 
@@ -27,13 +29,14 @@ from .report_input import collected, grouped
 
 def report(
     runs: Positional[tuple[Path, ...]],
-    out: Path,
+    out: FolderOut,
     policy_names: Annotated[tuple[str, ...], arg(name="policies", metavar="A B")] = (),
     mild: str = "stroke_mild",
     severe: str = "stroke_severe",
     seed: int = 0,
     environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
     exoskeleton: str | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Rebuild tables and figures: learning curves, tracking over help, patients over time, the worst patient.
 
@@ -46,27 +49,29 @@ def report(
         seed: of these patients.
         environment: of the patients over time, by id; that of the evaluations or trainings where it is not given.
         exoskeleton: of the patients over time: device by name or YAML file, or changes of the default one as JSON.
+        overwrite: replace files in the folder that this command did not write.
     """
     require_matplotlib()
     used = None if environment is None else environment_id(environment)
     trainings, evaluations = collected(runs)
-    check_writable(out / "report.md")
-    lines = ["# Report", ""]
-    if trainings:
-        lines += _trainings(out, trainings)
-    for k, results in enumerate(evaluations):
-        lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
-    shown = _shown(policy_names, evaluations, trainings)
-    if shown:
-        settings = evaluations[0].get("settings", {}) if evaluations else repeated(shown, None)
-        settings = {**settings, **device_settings(exoskeleton), "environment": used or _place(trainings, evaluations)}
-        lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed, settings)
-    if shown and evaluations:
-        lines += _worst(out, shown, evaluations[0])
-    with whole_file(out / "report.md") as file:
-        file.write("\n".join(lines))
-    print(f"written: {out}")
-    return 0
+    inputs = [mild, severe, exoskeleton, *runs, *policy_names]
+    with Outputs("report", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
+        lines = ["# Report", ""]
+        if trainings:
+            lines += _trainings(out, trainings)
+        for k, results in enumerate(evaluations):
+            lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
+        shown = _shown(policy_names, evaluations, trainings)
+        if shown:
+            settings = evaluations[0].get("settings", {}) if evaluations else repeated(shown, None)
+            place = used or _place(trainings, evaluations)
+            settings = {**settings, **device_settings(exoskeleton), "environment": place}
+            lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed, settings)
+        if shown and evaluations:
+            lines += _worst(out, shown, evaluations[0])
+        write_text(out / "report.md", "\n".join(lines))
+    print(f"written: {outputs.where(out)}")
+    return FAILED_RUN if outputs.failed else 0
 
 
 def _place(trainings: Mapping[Path, Any], evaluations: Sequence[Mapping[str, Any]]) -> str:
@@ -92,7 +97,7 @@ def _trainings(out: Path, trainings: Mapping[Path, list[dict[str, Any]]]) -> lis
     ]
     for path, curve in trainings.items():
         record = read_record(path)
-        who = f"{path.name} | {record['algorithm']} | {record['seed']}"
+        who = " | ".join(markdown_cell(str(x)) for x in (path.name, record["algorithm"], record["seed"]))
         if not curve:
             lines.append(f"| {who} | no evaluation yet | | | | |")
             continue
@@ -158,7 +163,14 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
     sentence = worst["event"] or f"return {m['return']:.4g}"
     if not worst["event"] and "tracking_rms_deg" in m:
         sentence = f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
-    return [f"## Worst patient of {judged.title}", "", sentence, "", "![The worst patient](worst_patient.png)", ""]
+    return [
+        f"## Worst patient of {one_line(judged.title)}",
+        "",
+        sentence,
+        "",
+        "![The worst patient](worst_patient.png)",
+        "",
+    ]
 
 
 def _badness(one: Mapping[str, Any]) -> tuple[float, float]:

@@ -8,19 +8,20 @@ from typing import Annotated
 from tqdm import tqdm
 from tyro.conf import arg
 
-from dms_core.output_file import check_writable
+from dms_core.command_line import FolderOut
+from dms_core.errors import Stopped
+from dms_core.output_place import check_folder
 
 from ..distributed.cluster import share_out
 from ..distributed.sweep import planned, steps_of, train_share
 from ..environment import PROGRAM
 from ..training.config import Config
 from ..training.usable import require_training
-from .train import STOPPED
 
 
 def sweep(
     configs: tuple[Path, ...],
-    out: Path,
+    out: FolderOut,
     seeds: tuple[int, ...] = (0, 1, 2),
     changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
     address: str | None = None,
@@ -40,7 +41,7 @@ def sweep(
     """
     require_training()
     shares = planned(configs, seeds, changes, out, environment)
-    check_writable(out / "sweep.json")
+    check_folder(out)
     total = sum(Config.of(content, "").n_timesteps for content, _, _ in shares)
     with tqdm(total=total, unit="step", unit_scale=True, leave=False, disable=None) as bar:
 
@@ -53,8 +54,7 @@ def sweep(
                 done=lambda k: bar.write(f"done: {shares[k][2]}"),
             )  # fmt: skip
         except KeyboardInterrupt:
-            print("stopped; the same command goes on from the last checkpoints")
-            return STOPPED
+            raise Stopped("the same command goes on from the last checkpoints.") from None
     for (_, _, folder), best in zip(shares, best_ones, strict=True):
         print(f"{folder}: best return {best['return']:.4g} after {best['steps']} steps")
     print(f"figures: {PROGRAM} report {' '.join(folder for _, _, folder in shares)} --out {out / 'report'}")

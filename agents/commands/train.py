@@ -12,15 +12,14 @@ from typing import Annotated, Any
 from tqdm import tqdm
 from tyro.conf import arg
 
+from dms_core.command_line import STOPPED, FolderOut
 from dms_core.config_files import configs
-from dms_core.errors import InputError
+from dms_core.errors import InputError, Stopped
 
 from ..environment import PROGRAM, environment_id
 from ..evaluation.episode import judged
 from ..training.usable import checked_config, require_training
 
-STOPPED = 130
-"""Exit status of a run that was told to stop."""
 BAR = "{percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt} steps, {rate_fmt}, {elapsed} passed, {remaining} left"
 
 
@@ -28,7 +27,7 @@ def train(
     config: Path | None = None,
     seed: int = 0,
     changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
-    out: Path | None = None,
+    out: FolderOut | None = None,
     resume: Path | None = None,
     environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
 ) -> int:
@@ -51,11 +50,14 @@ def train(
 
     with _stopping() as stop:
         folder, used, seed = _begun(config, seed, changes, out, resume, environment)
-        with folder.locked(), _bar(used.n_timesteps) as report:
-            run = TrainingRun(folder, used, seed, report, judged, stop)
-            for line in _outlook(run.steps, run.end, used.n_timesteps):
-                tqdm.write(line)
-            done = run.run()
+        try:
+            with folder.locked(), _bar(used.n_timesteps) as report:
+                run = TrainingRun(folder, used, seed, report, judged, stop)
+                for line in _outlook(run.steps, run.end, used.n_timesteps):
+                    tqdm.write(line)
+                done = run.run()
+        except KeyboardInterrupt:
+            raise Stopped(f"at once; what was saved before is in '{folder.path}'.") from None
     if not done:
         stopped = f"stopped after {run.steps} steps, an unfinished round is dropped"
         print(f"{stopped}; go on with: {PROGRAM} train --resume {folder.path}")

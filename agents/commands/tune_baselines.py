@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import shlex
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 from tqdm import tqdm
 from tyro.conf import arg
 
+from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
-from dms_core.output_file import check_writable, whole_file
+from dms_core.errors import Stopped
+from dms_core.output_file import one_line, write_text
+from dms_core.outputs import OutputFile, Outputs, partial
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.tuning import MEASURED, POPULATION, Try, tunable, tune
@@ -21,6 +26,8 @@ from ..policies.tuned import FILE
 from .options import device_settings
 
 TRIES = "baselines_tries.csv"
+NUMBERS, TABLE = rb"\A# Numbers of the baselines with the best mean return on ", rb"\A# python -m \w+ tune-baselines "
+"""Marks of the files that this command wrote, as regular expressions."""
 
 
 def tune_baselines(
@@ -30,9 +37,10 @@ def tune_baselines(
     seed: int = 0,
     repetitions: int = 1,
     workers: int = 1,
-    out: Path | None = None,
+    out: FolderOut | None = None,
     environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
     exoskeleton: str | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Search the baselines' numbers for the best mean return on the training population.
 
@@ -46,9 +54,10 @@ def tune_baselines(
         out: folder of baselines.yml, which the policies read, and of the table of tries; default: where they read it.
         environment: in which, by id.
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
+        overwrite: replace files of these names that this command did not write.
     """
     folder = (configs() / FILE).parent if out is None else out
-    check_writable(folder / TRIES)
+    best, table = folder / Path(FILE).name, folder / TRIES
     settings = device_settings(exoskeleton)
     command = f"{PROGRAM} tune-baselines --tries {tries} --patients {patients} --seed {seed}"
     command += f" --population {shlex.quote(population)}" if population != POPULATION else ""
@@ -56,33 +65,62 @@ def tune_baselines(
     command += f" --env {environment}" if environment != ENVIRONMENT else ""
     command += f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else ""
     best_first: dict[str, list[Try]] = {}
-    with tqdm(total=len(tunable()) * tries, unit="try", leave=False, disable=None, file=sys.stderr) as bar:
-
-        def progress(name: str) -> None:
-            bar.set_description(name)
-            bar.update()
-
-        for name in tunable():
-            best_first[name] = tune(
-                name, tries, patients, seed, population=population, workers=workers, progress=progress,
-                environment=environment, repetitions=repetitions, **settings,
-            )  # fmt: skip
-    texts = {Path(FILE).name: _yaml(best_first, population, command), TRIES: _table(best_first, command)}
-    for name, text in texts.items():
-        with whole_file(folder / name) as file:
-            file.write(text)
+    files = [OutputFile("--out", best, NUMBERS), OutputFile("--out", table, TABLE)]
+    with Outputs("tune-baselines", files=files, inputs=[population, exoskeleton], overwrite=overwrite) as outputs:
+        tried = _Tried(tries, table, command)
+        with tried.kept_when_stopped(outputs):
+            for name in tunable():
+                best_first[name] = tune(
+                    name, tries, patients, seed, population=population, workers=workers, progress=tried.add,
+                    environment=environment, repetitions=repetitions, **settings,
+                )  # fmt: skip
+        write_text(best, _yaml(best_first, population, command))
+        write_text(table, _table(best_first, command))
     for name, ranked in best_first.items():
-        best = ranked[0]
-        print(f"{name:18} return {best.measures['return']:.1f}  {best.numbers}")
-    print(f"written: {folder}")
-    return 0
+        print(f"{name:18} return {ranked[0].measures['return']:.1f}  {ranked[0].numbers}")
+    print(f"written: {outputs.moved or folder}")
+    return FAILED_RUN if outputs.failed else 0
+
+
+class _Tried:
+    """Tries as they are done, with a bar.
+
+    Args:
+        tries: of each policy.
+        table: file of all tries.
+        command: as it stands in the table.
+    """
+
+    def __init__(self, tries: int, table: Path, command: str) -> None:
+        self.total, self.table, self.command = len(tunable()) * tries, table, command
+        self.done: dict[str, list[Try]] = {}
+        self.bar = tqdm(total=self.total, unit="try", leave=False, disable=None, file=sys.stderr)
+
+    def add(self, one: Try) -> None:
+        """One more."""
+        self.done.setdefault(one.policy, []).append(one)
+        self.bar.set_description(one.policy)
+        self.bar.update()
+
+    @contextlib.contextmanager
+    def kept_when_stopped(self, outputs: Outputs) -> Iterator[None]:
+        """Within, Ctrl-C writes the tries so far."""
+        try:
+            with self.bar:
+                yield
+        except KeyboardInterrupt:
+            if not self.done:
+                raise
+            write_text(part := partial(self.table), _table(self.done, self.command))
+            count = sum(map(len, self.done.values()))
+            raise Stopped(f"{count} of {self.total} tries are in '{outputs.where(part)}'.") from None
 
 
 def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
     """Best numbers of each policy, with where they are from."""
     lines = [
-        f"# Numbers of the baselines with the best mean return on '{population}', found by",
-        f"#   {command}",
+        f"# Numbers of the baselines with the best mean return on '{one_line(population)}', found by",
+        f"#   {one_line(command)}",
         f"# All tries stand in {TRIES}.",
     ]
     for name, ranked in tries.items():
@@ -94,7 +132,7 @@ def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
 def _table(tries: dict[str, list[Try]], command: str) -> str:
     """All tries, best first."""
     text = io.StringIO()
-    text.write(f"# {command}; means over the patients\n")
+    text.write(f"# {one_line(command)}; means over the patients\n")
     rows = csv.writer(text, lineterminator="\n")
     known = [m for m in MEASURED if all(m in one.measures for ranked in tries.values() for one in ranked)]
     rows.writerow(["policy", *known, "numbers"])

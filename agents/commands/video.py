@@ -2,40 +2,46 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import IO, Annotated, Any
 
 import numpy as np
 from tqdm import tqdm
 from tyro.conf import arg
 
-from dms_core.errors import DmsError, InputError, extra
-from dms_core.output_file import check_writable
+from dms_core.command_line import FAILED_RUN, FileOut
+from dms_core.errors import DmsError, InputError, Stopped, extra
+from dms_core.output_file import write_file
+from dms_core.outputs import OutputFile, Outputs
 from exo_env.patient.population import population
 
-from ..environment import ENVIRONMENT, environment_id
+from ..environment import ENVIRONMENT, PROGRAM, environment_id
 from ..evaluation.episode import world_of
-from ..policies.learned import find_policy
+from ..policies.learned import find_policy, shipped_policies
 from ..policies.policy import Policy
 from .options import device_settings, repeated
 
 BAND, FONT, MOST = 44, 18, 4
 """Height of the titles and size of their letters [pixel], and policies that fit side by side."""
 INK, WARNING, PAPER = (40, 40, 40), (190, 50, 20), (255, 255, 255)
+MADE_BY, MARK = f"{PROGRAM} video", rb"python -m \w+ video"
+"""Comment in the files, and the regular expression by which they are known."""
 GIF_STEP = 2
 """A GIF takes every second picture: it is large, and few viewers show 50 a second."""
 
 
 def video(
     policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="A B")],
-    out: Path,
+    out: FileOut,
     patient: str = "stroke_severe",
     seed: int = 0,
     repetitions: int | None = None,
     environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
     exoskeleton: str | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Film policies side by side, with the same patient, load and repetition.
 
@@ -47,6 +53,7 @@ def video(
         repetitions: of the movement; as the trained policies learned, 1 without one, where not given.
         environment: in which, by id; module:ID where another package registers it.
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
+        overwrite: replace a file of this name that this command did not write.
     """
     if not 1 <= len(set(policy_names)) == len(policy_names) <= MOST:
         raise InputError(f"--policy {' '.join(policy_names)}: expected one to {MOST} different names.")
@@ -55,14 +62,26 @@ def video(
     environment_id(environment)
     used = [find_policy(name) for name in policy_names]
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
-    stages = [Stage(policy, patient, seed, environment, **settings) for policy in used]
     out = _possible(out)
-    check_writable(out)
-    rate, total = stages[0].rate, stages[0].length
-    with tqdm(total=total, unit="picture", leave=False, disable=None) as bar:
-        _write(out, _shown(pictures(stages), bar, GIF_STEP if out.suffix == ".gif" else 1), rate)
-    print(f"written: {out}")
-    return 0
+    inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    file = OutputFile("--out", out, MARK)
+    with Outputs("video", files=[file], inputs=inputs, overwrite=overwrite) as outputs:
+        stages = [Stage(policy, patient, seed, environment, **settings) for policy in used]
+        rate, total = stages[0].rate, stages[0].length
+        drawn = 0
+        with tqdm(total=total, unit="picture", leave=False, disable=None) as bar:
+
+            def progress() -> None:
+                nonlocal drawn
+                drawn += 1
+                bar.update()
+
+            try:
+                _write(out, _shown(pictures(stages), progress, GIF_STEP if out.suffix == ".gif" else 1), rate)
+            except KeyboardInterrupt:
+                raise Stopped(f"{drawn} of {total} pictures were drawn; nothing was written.") from None
+    print(f"written: {outputs.where(out)}")
+    return FAILED_RUN if outputs.failed else 0
 
 
 class Stage:
@@ -125,10 +144,10 @@ def band(width: int, title: str, event: str) -> np.ndarray:
     return pygame.surfarray.array3d(surface).swapaxes(0, 1)
 
 
-def _shown(whole: Iterator[np.ndarray], bar: tqdm, every: int) -> Iterator[np.ndarray]:
-    """Every so many pictures, with the bar moved."""
+def _shown(whole: Iterator[np.ndarray], progress: Callable[[], None], every: int) -> Iterator[np.ndarray]:
+    """Every so many pictures; `progress` is called with each of them all."""
     for k, picture in enumerate(whole):
-        bar.update()
+        progress()
         if k % every == 0:
             yield picture
 
@@ -155,21 +174,37 @@ def _possible(out: Path) -> Path:
 
 
 def _write(out: Path, shown: Iterator[np.ndarray], rate: int) -> None:
-    """Write the file whole or not at all."""
+    """Write the film whole or not at all.
+
+    Raises:
+        DmsError: there is no room for it while it is made.
+    """
     import imageio.v2 as imageio
 
-    temporary = out.with_name(f".part.{out.name}")
     if out.suffix == ".mp4":
         options: dict[str, Any] = {"fps": rate, "codec": "libx264", "macro_block_size": 2, "quality": 7}
+        options["output_params"] = ["-metadata", f"comment={MADE_BY}"]
     else:
         options = {"duration": 1000.0 * GIF_STEP / rate, "loop": 0}
-    try:
-        writer: Any = imageio.get_writer(temporary, **options)
-        with writer:
-            for picture in shown:
-                writer.append_data(picture)
-        os.replace(temporary, out)
-    except OSError as error:
-        raise DmsError(f"output '{out}' cannot be written: {error.strerror or error}.") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    # The other program writes into a folder of its own, and what it leaves there goes with the folder.
+    with tempfile.TemporaryDirectory(prefix="exo_env_") as folder:
+        film = Path(folder) / f"film{out.suffix}"
+        try:
+            with imageio.get_writer(film, **options) as writer:
+                opened: Any = writer
+                for picture in shown:
+                    opened.append_data(picture)
+        except OSError as error:
+            raise DmsError(f"the film cannot be made in '{folder}': {error.strerror or error}.") from None
+        write_file(out, lambda file: _copy(film, file))
+
+
+def _copy(film: Path, file: IO[bytes]) -> None:
+    """A film with the comment that says what made it; the writer of GIFs takes none."""
+    with film.open("rb") as made:
+        if film.suffix == ".mp4":
+            shutil.copyfileobj(made, file)
+            return
+        content, comment = made.read(), MADE_BY.encode()
+    # GIF89a: a comment extension, before the byte that ends the file.
+    file.write(content[:-1] + bytes([0x21, 0xFE, len(comment)]) + comment + b"\0" + content[-1:])

@@ -7,7 +7,7 @@ the difference is known better than either (`differences`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -124,13 +124,20 @@ def episodes_of(
     one: Policy, plan: Plan, cases: Sequence[Case], progress: Callable[[str], None] | None = None
 ) -> list[dict[str, Any]]:
     """Episodes of a policy, one a case."""
-    env, episodes = world_of(one, plan.patient, plan.environment, **plan.settings), []
-    for number, load in cases:
-        episodes.append({"seed": number, **episode(env, one, number, load)})
+    episodes = []
+    for done in each_episode_of(one, plan, cases):
+        episodes.append(done)
         if progress is not None:
             progress(one.name)
-    env.close()
     return episodes
+
+
+def each_episode_of(one: Policy, plan: Plan, cases: Sequence[Case]) -> Iterator[dict[str, Any]]:
+    """Episodes of a policy as they are done, one a case."""
+    env = world_of(one, plan.patient, plan.environment, **plan.settings)
+    for number, load in cases:
+        yield {"seed": number, **episode(env, one, number, load)}
+    env.close()
 
 
 def results_of(policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any]]], plan: Plan) -> dict[str, Any]:

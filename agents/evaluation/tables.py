@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from dms_core.output_file import markdown_cell, one_line
+
 from ..environment import ENVIRONMENT
 from ..policies.baselines import POLICIES
 from .evaluate import COMPARED, able_ones, differences
@@ -88,9 +90,10 @@ def whole_table(results: Mapping[str, Any]) -> list[str]:
 
     That second part is left out where everybody can, and differences where there is one policy.
     """
-    head, *rows = table_rows(results)
+    head, *rows = ([markdown_cell(cell) for cell in row] for row in table_rows(results))
     return [
-        f"## {heading(results)}", "", f"{statistic(results).capitalize()}.", *left_out_lines(results), "",
+        f"## {one_line(heading(results))}", "", f"{statistic(results).capitalize()}.",
+        *map(one_line, left_out_lines(results)), "",
         f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
     ]  # fmt: skip
 

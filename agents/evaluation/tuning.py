@@ -7,7 +7,11 @@ return, in which an unsafe episode weighs as much as it costs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import multiprocessing
+import signal
+import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import repeat
@@ -27,6 +31,8 @@ POPULATION, STREAM = "mixed", 2**32
 """Training population by default; STREAM is added to a seed, so that no patients are those of an evaluation with it."""
 SPREAD = 0.1
 """Standard deviation around the best, as a share of each range."""
+FORGETTING = 0.5
+"""In which a pool forgets the tries that it has not begun [s]."""
 BATCH = 8
 """Tries of the second half that go out from the same best one."""
 MEASURED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N", "unsafe")
@@ -68,7 +74,7 @@ def tune(
     population: str = POPULATION,
     environment: str = ENVIRONMENT,
     workers: int = 1,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[Try], None] | None = None,
     **settings: Any,
 ) -> list[Try]:
     """Tries of a policy, best first.
@@ -81,7 +87,7 @@ def tune(
         population: of the patients, by name or YAML file.
         environment: its id.
         workers: processes.
-        progress: called with the name of the policy after each try.
+        progress: called with each try.
         settings: further ones of the environment.
 
     Raises:
@@ -110,9 +116,9 @@ def tune(
         for place, one in zip(places, tried, strict=True):
             done.append((place, one))
             if progress is not None:
-                progress(policy)
+                progress(one)
 
-    with ProcessPoolExecutor(workers) as pool:
+    with _pool(workers) as pool:
         first = tries // 2
         run(qmc.LatinHypercube(len(ranges), rng=generator).random(first), pool)
         while len(done) < tries:
@@ -120,6 +126,28 @@ def tune(
             count = min(BATCH, tries - len(done))
             run(np.clip(best + SPREAD * generator.standard_normal((count, len(ranges))), 0.0, 1.0), pool)
     return [one for _, one in sorted(done, key=_return, reverse=True)]
+
+
+@contextlib.contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end without a word when the user stops the command."""
+    with ProcessPoolExecutor(workers, initializer=_leave_signals_alone) as pool:
+        before = set(multiprocessing.active_children())
+        try:
+            yield pool
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            # Its thread reports a traceback where a process ends while it still knows tries that were cancelled.
+            time.sleep(FORGETTING)
+            for child in set(multiprocessing.active_children()) - before:
+                child.kill()
+            raise
+
+
+def _leave_signals_alone() -> None:
+    """Ctrl-C reaches every process of a terminal; this one leaves it to its parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _return(entry: tuple[np.ndarray, Try]) -> float:

@@ -90,7 +90,7 @@ def upper_bound(
     *,
     repetitions: int = 1,
     environment: str = ENVIRONMENT,
-    progress: Callable[[], object] = lambda: None,
+    progress: Callable[[Tried], object] = lambda one: None,
     **settings: Any,
 ) -> tuple[list[Tried], np.ndarray]:
     """Try schedules on each patient.
@@ -101,7 +101,7 @@ def upper_bound(
         seed: of the patients.
         repetitions: of the movement in an episode.
         environment: its id; one with a PID and a reference.
-        progress: called after each patient.
+        progress: called with what came of each patient.
         settings: further ones of the environment.
 
     Returns:
@@ -117,7 +117,7 @@ def upper_bound(
     tried, results = schedules(np.random.default_rng(seed)), []
     for one in patient_seeds(seed, patients):
         results.append(tried_on(worlds, one, tried, repetitions))
-        progress()
+        progress(results[-1])
     worlds.close()
     return results, tried
 

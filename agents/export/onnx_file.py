@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import DmsError, extra
+from dms_core.output_file import write_bytes
 
 from ..policies.learned import LearnedPolicy
 from ..policies.network import Architecture
@@ -37,7 +38,7 @@ def write_onnx(policy: LearnedPolicy, path: Path) -> None:
         opset_imports=[onnx.helper.make_opsetid("", OPSET)], ir_version=IR_VERSION,
     )  # fmt: skip
     onnx.checker.check_model(model, full_check=True)
-    path.write_bytes(model.SerializeToString())
+    write_bytes(path, model.SerializeToString())
 
 
 class _Graph:

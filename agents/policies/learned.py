@@ -18,6 +18,7 @@ from pydantic import Field
 
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
+from dms_core.output_file import write_bytes, write_text
 from exo_env.settings import Settings
 
 from ..checkpoint import Store
@@ -125,10 +126,9 @@ class LearnedPolicy(Policy):
     def save(self, folder: Path) -> None:
         """Write the folder; the description comes last, so that a folder with one is whole."""
         content = to_bytes(self.arrays)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / WEIGHTS).write_bytes(content)
+        write_bytes(folder / WEIGHTS, content)
         facts = self.description.model_dump(mode="json") | {"weights_sha256": hashlib.sha256(content).hexdigest()}
-        (folder / DESCRIPTION).write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        write_text(folder / DESCRIPTION, json.dumps(facts, indent=2) + "\n")
 
     def reset(self, env: gymnasium.Env) -> None:
         """Forget the last patient; an environment that the policy does not know is refused."""

@@ -12,7 +12,7 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from dms_core.errors import InputError
-from dms_core.output_file import write_json
+from dms_core.output_file import write_json, write_text
 
 from ..environment import make, patient_seeds
 from ..policies.learned import LearnedPolicy
@@ -88,7 +88,7 @@ def checkpoint_name(steps: int) -> str:
 def _write(part: Path, policy: LearnedPolicy, model: BaseAlgorithm, record: dict[str, Any]) -> None:
     save_model(model, part)
     policy.save(part)
-    (part / STATE).write_text(json.dumps(record), encoding="utf-8")
+    write_text(part / STATE, json.dumps(record))
 
 
 def _mean(values: list[Any]) -> float | None:

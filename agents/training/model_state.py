@@ -21,6 +21,7 @@ from stable_baselines3.common.save_util import load_from_zip_file, recursive_set
 from stable_baselines3.common.vec_env import VecNormalize
 
 from dms_core.errors import InputError
+from dms_core.output_file import write_bytes, write_file
 
 MODEL, STATISTICS, REPLAY, RANDOM = "model.zip", "statistics.npz", "replay.npz", "random.npz"
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -44,7 +45,7 @@ def save_model(model: BaseAlgorithm, folder: Path) -> None:
     """Write networks and statistics into a folder."""
     content = io.BytesIO()
     model.save(content)
-    (folder / MODEL).write_bytes(content.getvalue())
+    write_bytes(folder / MODEL, content.getvalue())
     if (statistics := model.get_vec_normalize_env()) is not None:
         arrays: dict[str, Any] = {}
         for name, one in _running(statistics).items():
@@ -103,7 +104,7 @@ def _save_replay(model: OffPolicyAlgorithm, path: Path) -> None:
     buffer: Any = model.replay_buffer
     size = buffer.size()
     columns = {name: getattr(buffer, name)[:size] for name in COLUMNS}
-    np.savez(path, allow_pickle=False, place=np.array([buffer.pos, buffer.full]), **columns)
+    _write(path, place=np.array([buffer.pos, buffer.full]), **columns)
 
 
 def _load_replay(model: OffPolicyAlgorithm, path: Path) -> None:
@@ -119,7 +120,7 @@ def _load_replay(model: OffPolicyAlgorithm, path: Path) -> None:
 
 
 def _write(path: Path, **arrays: Any) -> None:
-    np.savez(path, allow_pickle=False, **arrays)
+    write_file(path, lambda file: np.savez(file, allow_pickle=False, **arrays))
 
 
 def _read(path: Path) -> Mapping[str, np.ndarray]:

@@ -16,6 +16,8 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dms_core.errors import DmsError
+from dms_core.output_file import write_text
+from dms_core.output_place import cannot
 
 from ..policies.learned import LearnedPolicy
 from .algorithms import build
@@ -94,8 +96,10 @@ class TrainingRun:
         """
         left = self.config.n_timesteps - self.steps
         self._began = time.perf_counter() - self.seconds
-        self.model.set_logger(configure(str(self.folder.path / "tensorboard"), ["tensorboard"]))
+        logger = None
         try:
+            logger = configure(str(self.folder.path / "tensorboard"), ["tensorboard"])
+            self.model.set_logger(logger)
             if left > 0:
                 self.model.learn(left, callback=_Watch(self), reset_num_timesteps=False)
             done = self.steps >= self.config.n_timesteps
@@ -103,9 +107,7 @@ class TrainingRun:
                 self.evaluate()
             self.save()
         except OSError as error:
-            raise DmsError(
-                f"'{self.folder.path}' cannot be written: {error.strerror or error}. {self._advice()}"
-            ) from None
+            raise DmsError(f"{cannot(self.folder.path, error)} {self._advice()}") from None
         except ValueError as error:
             if isinstance(error, DmsError) or not _diverged(self.model, error):
                 raise
@@ -115,7 +117,8 @@ class TrainingRun:
             worlds = self.model.get_env()
             if worlds is not None:
                 worlds.close()
-            self.model.logger.close()
+            if logger is not None:
+                logger.close()
         return done
 
     def evaluate(self) -> None:
@@ -135,7 +138,7 @@ class TrainingRun:
         def write(part: Path) -> None:
             save_state(self.model, part)
             self.policy().save(part)
-            (part / STATE).write_text(json.dumps(state), encoding="utf-8")
+            write_text(part / STATE, json.dumps(state))
 
         self.folder.checkpoints.save(checkpoint_name(self.steps), write)
         self.saved = self.steps

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
-from dms_core.output_file import check_writable, whole_file, write_json
+from dms_core.output_file import write_json, write_text
+from dms_core.output_place import check_writable
 from dms_core.yaml_text import write_yaml
 
 from ..checkpoint import Store
@@ -80,8 +81,7 @@ class RunFolder:
 
     def write_config(self, config: Config) -> None:
         """Keep the configuration."""
-        with whole_file(self.path / CONFIG) as file:
-            write_yaml(config.content(), file)
+        write_text(self.path / CONFIG, write_yaml(config.content()))
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

@@ -289,8 +289,15 @@ class Simulation(World):
         self._rows = [present[None]] if not s.counts[COUNTS.restart] else []
 
     def trajectory(self) -> Trajectory:
-        """Everything computed so far."""
+        """Everything computed so far.
+
+        Raises:
+            SimulationError: nothing was computed.
+            KeyboardInterrupt: nothing was computed, as the user stopped it before.
+        """
         if not self._rows or not sum(len(r) for r in self._rows):
+            if self.result is Result.INTERRUPTED:
+                raise KeyboardInterrupt
             raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
         return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message)

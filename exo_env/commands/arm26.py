@@ -7,21 +7,29 @@ import sys
 from pathlib import Path
 
 from dms_core import Simulation, SolverOptions
-from dms_core.command_line import FAILED_RUN, bar_of_run, moves
-from dms_core.errors import InputError
+from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves
+from dms_core.errors import InputError, Stopped
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.output_file import check_writable, write_csv
+from dms_core.output_file import check_size, write_csv
+from dms_core.outputs import OutputFile, Outputs, partial
+from dms_core.results import Result
 from exo_env.ecosystem import bare_arm as bare
+
+TABLE = rb"\Atime_s,elbow_flexion_rad,"
+"""Mark of the files that this command wrote, as a regular expression."""
+COLUMNS = 1 + 3 + 6 * 4 + 6
+"""Of the table, roughly: time, elbow, six muscles and the elbow's reaction."""
 
 
 def arm26(
     excitations: Path,
-    out: Path,
+    out: FileOut,
     t_end: float,
     start_deg: float = 20.0,
     start_activation: float = 0.05,
     rtol: float = SolverOptions.rtol,
     sample: float = 0.01,
+    overwrite: bool = False,
 ) -> int:
     """Drive the bare arm26 by a table of excitations and write its motion, muscles and elbow reaction as CSV.
 
@@ -34,6 +42,7 @@ def arm26(
         start_activation: of every muscle at the start, 0.01 to 1 [-].
         rtol: relative tolerance of the error per step.
         sample: time between rows [s].
+        overwrite: replace a file of this name that this command did not write.
     """
     for name, value in (("--t-end", t_end), ("--sample", sample)):
         if not (math.isfinite(value) and value > 0.0):
@@ -42,17 +51,22 @@ def arm26(
         raise InputError(f"--start-deg {start_deg}: expected an angle between -180 and 180 deg.")
     if not MINIMUM <= start_activation <= 1.0:
         raise InputError(f"--start-activation {start_activation}: expected a number from {MINIMUM} to 1.")
-    check_writable(out)
-    system = bare.bare_arm(math.radians(start_deg), bare.read_excitations(excitations), start_activation)
-    simulation = Simulation(system, SolverOptions(rtol=rtol))
-    with bar_of_run(t_end) as bar:
-        simulation.advance(t_end, moves(bar))
-    trajectory = simulation.trajectory()
-    write_csv(out, bare.table(trajectory, sample))
-    print(f"{trajectory.message} {trajectory.stats.steps} steps. Written: {out}")
+    check_size("--sample", t_end, sample, COLUMNS)
+    file = OutputFile("--out", out, TABLE)
+    with Outputs("arm26", files=[file], inputs=[excitations], overwrite=overwrite) as outputs:
+        system = bare.bare_arm(math.radians(start_deg), bare.read_excitations(excitations), start_activation)
+        simulation = Simulation(system, SolverOptions(rtol=rtol))
+        with bar_of_run(t_end) as bar:
+            simulation.advance(t_end, moves(bar))
+        trajectory = simulation.trajectory()
+        if trajectory.result is Result.INTERRUPTED:
+            write_csv(part := partial(out), bare.table(trajectory, sample))
+            raise Stopped(f"{trajectory.t[-1]:.4g} of {t_end:.4g} s are in '{outputs.where(part)}'.")
+        write_csv(out, bare.table(trajectory, sample))
+    print(f"{trajectory.message} {trajectory.stats.steps} steps. Written: {outputs.where(out)}")
     for warning in bare.warnings(trajectory):
         print(f"warning: {warning}", file=sys.stderr)
     if not trajectory.success:
-        print(f"The run failed; '{out}' holds the part before.", file=sys.stderr)
+        print(f"The run failed; '{outputs.where(out)}' holds the part before.", file=sys.stderr)
         return FAILED_RUN
-    return 0
+    return FAILED_RUN if outputs.failed else 0

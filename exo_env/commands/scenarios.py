@@ -10,10 +10,11 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core import SolverOptions
-from dms_core.command_line import moves
-from dms_core.errors import InputError
+from dms_core.command_line import FAILED_RUN, FolderOut, moves
+from dms_core.errors import InputError, Stopped
 from dms_core.model.control.ziegler_nichols import Gains
-from dms_core.output_file import check_writable, write_csv, write_json
+from dms_core.output_file import write_csv, write_json
+from dms_core.outputs import Outputs
 from exo_env.commands.tune import draw_steps
 from exo_env.ecosystem import exoskeleton as devices
 from exo_env.ecosystem import subject as subjects
@@ -29,12 +30,13 @@ BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {el
 
 
 def scenarios(
-    out: Path,
+    out: FolderOut,
     exoskeleton: Annotated[str, arg(metavar="NAME|FILE.yaml")] = devices.DEFAULT,
     subject: Annotated[str, arg(metavar="NAME|FILE.yaml")] = subjects.DEFAULT,
     exercise: Annotated[Path | None, arg(metavar="FILE.yaml")] = None,
     scenarios: Annotated[tuple[Path, ...], arg(metavar="FILE.yaml ...")] = (),
     rtol: float = SolverOptions.rtol,
+    overwrite: bool = False,
 ) -> int:
     """Simulate scenarios: figures, one table a scenario, and scenarios.json.
 
@@ -46,24 +48,28 @@ def scenarios(
         scenarios: scenarios, as in configs/scenarios/1_healthy.yaml; without them, the paper's four. The names of their
             files without the ending name the tables.
         rtol: relative tolerance of the error per step.
+        overwrite: replace files in the folder that this command did not write.
     """
-    check_writable(out / "scenarios.json")
     require_matplotlib()
     theirs, names, declared = _declared(exercise, scenarios)
-    ecosystem = Ecosystem(device=Exoskeleton.named(exoskeleton), subject=subject)
-    runs = _simulated(names, declared, theirs, ecosystem, SolverOptions(rtol=rtol))
-    summaries = [summary(r) for r in runs]
     of_the_paper = exercise is None and not scenarios
     shipped = (exoskeleton, subject) == (devices.DEFAULT, subjects.DEFAULT)
-    orderings = judged(summaries, shipped=shipped) if of_the_paper else []
-    for name, r in zip(names, runs, strict=True):
-        write_csv(out / f"{name}.csv", columns(r))
-    named = [{"name": name, **s} for name, s in zip(names, summaries, strict=True)]
-    write_json(out / "scenarios.json", {"scenarios": named, "orderings": orderings})
-    labels = [f"{k}: {s.title}" if of_the_paper else f"{names[k - 1]}: {s.title}" for k, s in enumerate(declared, 1)]
-    left_out = _draw(out, runs, labels, ecosystem)
-    print("\n".join([*_table(named), "", *_statements(orderings, of_the_paper), *left_out, f"written: {out}"]))
-    return 0
+    inputs = [exoskeleton, subject, exercise, *scenarios]
+    with Outputs("scenarios", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
+        ecosystem = Ecosystem(device=Exoskeleton.named(exoskeleton), subject=subject)
+        runs = _simulated(names, declared, theirs, ecosystem, SolverOptions(rtol=rtol))
+        summaries = [summary(r) for r in runs]
+        orderings = judged(summaries, shipped=shipped) if of_the_paper else []
+        for name, r in zip(names, runs, strict=True):
+            write_csv(out / f"{name}.csv", columns(r))
+        named = [{"name": name, **s} for name, s in zip(names, summaries, strict=True)]
+        write_json(out / "scenarios.json", {"scenarios": named, "orderings": orderings})
+        titles = [s.title for s in declared]
+        labels = [f"{k if of_the_paper else names[k - 1]}: {title}" for k, title in enumerate(titles, 1)]
+        left_out = _draw(out, runs, labels, ecosystem)
+    statements = [*_statements(orderings, of_the_paper), *left_out]
+    print("\n".join([*_table(named), "", *statements, f"written: {outputs.where(out)}"]))
+    return FAILED_RUN if outputs.failed else 0
 
 
 def _declared(exercise: Path | None, files: Sequence[Path]) -> tuple[Exercise, list[str], list[Scenario]]:
@@ -92,7 +98,11 @@ def _simulated(
     with tqdm(total=total, unit="s", leave=False, disable=None, bar_format=BAR) as bar:
         for name, scenario in zip(names, declared, strict=True):
             bar.set_description(name)
-            runs.append(run(scenario, exercise, ecosystem, options, moves(bar, len(runs) * exercise.duration)))
+            try:
+                runs.append(run(scenario, exercise, ecosystem, options, moves(bar, len(runs) * exercise.duration)))
+            except KeyboardInterrupt:
+                done = f"{len(runs)} of {len(declared)} scenarios were simulated"
+                raise Stopped(f"{done}; nothing was written.") from None
     return runs
 
 

@@ -8,7 +8,7 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN
-from dms_core.errors import InputError
+from dms_core.errors import InputError, Stopped
 from exo_env.ecosystem.exoskeleton import DEFAULT
 from exo_env.envs.soak import soak as long_run
 
@@ -49,4 +49,6 @@ def soak(
             print(f"{name:24} {value:.4g}" if isinstance(value, float) else f"{name:24} {value}")
     for sentence in result["failures"]:
         print(f"  {sentence}")
+    if result["steps"] < steps:
+        raise Stopped(f"the counts above are of {result['steps']} of {steps} steps.")
     return FAILED_RUN if result["not_finite_or_outside"] else 0

@@ -7,28 +7,41 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.model.control.ziegler_nichols import STEP, Gains, ziegler_nichols
-from dms_core.output_file import check_writable, write_json
+from dms_core.output_file import write_json
+from dms_core.outputs import Outputs
 from exo_env.ecosystem.exoskeleton import DEFAULT, Exoskeleton
 from exo_env.paper.tuning import START, StepExperiment, Tuning, proportional
 from exo_env.paper.tuning import tune as find_gains
 from exo_env.rendering.panels import require_matplotlib
 
 
-def tune(out: Path, exoskeleton: Annotated[str, arg(metavar="NAME|FILE.yaml")] = DEFAULT) -> int:
+def tune(
+    out: FolderOut,
+    exoskeleton: Annotated[str, arg(metavar="NAME|FILE.yaml")] = DEFAULT,
+    overwrite: bool = False,
+) -> int:
     """Repeat the Ziegler-Nichols procedure on a device: Kc, Tc, gains and what limits them, with Figs. 6 and 7.
 
     Args:
         out: folder for the figures and tuning.json; made where it is missing.
         exoskeleton: device, by name or YAML file; configs/exoskeletons/elbow.yaml shows every key. Its own `gains` and
             `tuning` do not count.
+        overwrite: replace files in the folder that this command did not write.
     """
-    check_writable(out / "tuning.json")
     require_matplotlib()
     device = Exoskeleton.named(exoskeleton)
+    with Outputs("tune", folder=out, inputs=[exoskeleton], overwrite=overwrite) as outputs:
+        _tune(out, device)
+    print(f"written: {outputs.where(out)}")
+    return FAILED_RUN if outputs.failed else 0
+
+
+def _tune(out: Path, device: Exoskeleton) -> None:
+    """Find the gains of a device; print, write and draw them."""
     tuning = find_gains(device, lambda kp, growth: print(f"  Kp = {kp:9.1f} N/rad: growth {growth:+.5f}", flush=True))
     _print_gains(tuning)
-    draw_steps(out, StepExperiment(device), tuning.critical.Kc, tuning.gains)
     write_json(
         out / "tuning.json",
         {
@@ -41,8 +54,7 @@ def tune(out: Path, exoskeleton: Annotated[str, arg(metavar="NAME|FILE.yaml")] =
             "trials": [{"kp_N_per_rad": kp, "growth": growth} for kp, growth in tuning.critical.trials],
         },
     )
-    print(f"written: {out}")
-    return 0
+    draw_steps(out, StepExperiment(device), tuning.critical.Kc, tuning.gains)
 
 
 def _print_gains(tuning: Tuning) -> None:

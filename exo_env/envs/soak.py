@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -37,7 +38,8 @@ def soak(
         settings: settings of the environment; the observation has all groups unless they say otherwise.
 
     Returns:
-        Counts of episodes, of what ended them and of failed solves, and the worst figures of all steps.
+        Counts of episodes, of what ended them and of failed solves, and the worst figures of all steps; fewer than
+        `steps` of them where the user stopped it (Ctrl-C).
 
     Raises:
         InputError: there is no such environment, or it is none of AssistanceEnv.
@@ -48,29 +50,33 @@ def soak(
     failures: list[str] = []
     bad, worst = 0, {"phi": 0.0, "phi_v": 0.0, "drift_rad": 0.0, "step_ms": 0.0}
     observation, _ = world.reset(seed=seed)
-    begin = time.perf_counter()
-    for k in range(steps):
-        before = time.perf_counter()
-        action = actions.uniform(-1.0, 1.0, world.action_space.shape)
-        observation, reward, terminated, truncated, info = world.step(action)
-        worst["step_ms"] = max(worst["step_ms"], 1e3 * (time.perf_counter() - before))
-        bad += not (np.isfinite(observation).all() and np.isfinite(reward) and observation in world.observation_space)
-        if info["solver_failed"]:
-            failures.append(info["event"])
-        if terminated or truncated or k == steps - 1:
-            ends[_end(world, truncated)] += 1
-            r = world.readings()
-            worst["phi"] = max(worst["phi"], r["solver.largest_phi"])
-            worst["phi_v"] = max(worst["phi_v"], r["solver.largest_phi_v"])
-            worst["drift_rad"] = max(worst["drift_rad"], abs(r["tracking.drift"]))
-            observation, _ = world.reset()
-        if progress is not None:
-            progress(k + 1)
+    begin, done = time.perf_counter(), 0
+    with contextlib.suppress(KeyboardInterrupt):
+        for k in range(steps):
+            before = time.perf_counter()
+            action = actions.uniform(-1.0, 1.0, world.action_space.shape)
+            observation, reward, terminated, truncated, info = world.step(action)
+            worst["step_ms"] = max(worst["step_ms"], 1e3 * (time.perf_counter() - before))
+            bad += not (
+                np.isfinite(observation).all() and np.isfinite(reward) and observation in world.observation_space
+            )
+            done = k + 1
+            if info["solver_failed"]:
+                failures.append(info["event"])
+            if terminated or truncated or done == steps:
+                ends[_end(world, truncated)] += 1
+                r = world.readings()
+                worst["phi"] = max(worst["phi"], r["solver.largest_phi"])
+                worst["phi_v"] = max(worst["phi_v"], r["solver.largest_phi_v"])
+                worst["drift_rad"] = max(worst["drift_rad"], abs(r["tracking.drift"]))
+                observation, _ = world.reset()
+            if progress is not None:
+                progress(done)
     return {
-        "steps": steps, "episodes": sum(ends.values()), "ends": dict(ends), "not_finite_or_outside": bad,
+        "steps": done, "episodes": sum(ends.values()), "ends": dict(ends), "not_finite_or_outside": bad,
         "failed_solves": len(failures), "failures": failures, "largest_phi": worst["phi"],
         "largest_phi_v": worst["phi_v"], "largest_drift_rad": worst["drift_rad"],
-        "slowest_step_ms": worst["step_ms"], "steps_per_second": steps / (time.perf_counter() - begin),
+        "slowest_step_ms": worst["step_ms"], "steps_per_second": done / (time.perf_counter() - begin),
     }  # fmt: skip
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import io
-import os
 from pathlib import Path
 from typing import Any
 
 from dms_core.errors import DmsError, extra
-from dms_core.output_file import check_writable
+from dms_core.output_file import write_bytes
 
 RESOLUTION = 150
 """Resolution of the figures [dots per inch]."""
@@ -49,10 +48,7 @@ def legend(figure: Any, ax: Any, columns: int) -> None:
 
 def save(figure: Any, path: Path) -> Path:
     """Write a picture as PNG, whole or not at all."""
-    check_writable(path)
     picture = io.BytesIO()
     figure.savefig(picture, format="png")
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_bytes(picture.getvalue())
-    os.replace(temporary, path)
+    write_bytes(path, picture.getvalue())
     return path

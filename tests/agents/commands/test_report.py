@@ -17,6 +17,7 @@ from agents.evaluation.report_figures import on_common_steps
 from agents.evaluation.statistics import interquartile_mean
 from agents.evaluation.time_course import time_course
 from agents.policies.baselines import policy
+from dms_core.outputs import MANIFEST
 from tests.agents.tiny import config_file
 
 PICTURES = {"learning_curves.png", "pareto.png", "patients.png", "worst_patient.png"}
@@ -82,7 +83,7 @@ def test_command_writes_all_pictures_and_tables(evaluated, tmp_path, capsys):
         assert main(["train", "--config", str(path), "--seed", str(seed), "--out", str(run)]) == 0
     out = tmp_path / "report"
     assert main(["report", *map(str, runs), str(evaluated), "--out", str(out)]) == 0
-    assert {p.name for p in out.iterdir()} == PICTURES | {"report.md"}
+    assert {p.name for p in out.iterdir()} == PICTURES | {"report.md", MANIFEST}
     text = (out / "report.md").read_text()
     assert "seed0 | ppo | 0" in text and "seed1 | ppo | 1" in text and "Worst patient of PID" in text
     assert all(f"({name})" in text for name in PICTURES)

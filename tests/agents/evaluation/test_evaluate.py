@@ -16,6 +16,7 @@ from agents.evaluation.tables import short_table, whole_table
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.learned import LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from dms_core.errors import InputError
+from dms_core.outputs import MANIFEST
 
 SHORT = {"episode_duration": 0.6}
 """Until the lift has begun; a whole episode tells no more and takes ten times as long."""
@@ -153,16 +154,22 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
     found = json.loads((tmp_path / "evaluation.json").read_text(), parse_constant=pytest.fail)
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 1
     assert (tmp_path / "evaluation.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["evaluation.json", "evaluation.md", "evaluation.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        MANIFEST,
+        "evaluation.json",
+        "evaluation.md",
+        "evaluation.png",
+    ]
 
 
-def test_without_matplotlib_the_figure_is_left_out(tmp_path, capsys, monkeypatch):
+def test_without_matplotlib_the_figure_is_left_out_and_no_earlier_one_stays(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("matplotlib")
+    command = ["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path / "out")]
+    assert main(command) == 0 and (tmp_path / "out" / "evaluation.png").is_file()
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "evaluation.png").touch()
-    assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path / "out")]) == 0
+    assert main(command) == 0
     assert "evaluation.png is left out: " in capsys.readouterr().out
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["evaluation.json", "evaluation.md"]
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [MANIFEST, "evaluation.json", "evaluation.md"]
 
 
 def test_command_takes_repetitions(tmp_path, capsys):

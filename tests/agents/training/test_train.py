@@ -1,5 +1,6 @@
 """Training: same seed same weights, any death is survived, every mistake is one sentence."""
 
+import errno
 import json
 import os
 import signal
@@ -305,3 +306,29 @@ def test_train_runs_share_no_environment_seeds():
     streams = {s + k for s in firsts for k in range(16)}
     assert len(streams) == 16 * len(firsts)
     assert max(firsts) + 16 < 2**32 and os.cpu_count()
+
+
+@pytest.mark.parametrize("place", ["config.yml", "run.json", "tensorboard", "state.json", "latest", "evaluations.json"])
+def test_a_full_disk_is_one_sentence_wherever_it_comes(place, tmp_path, capsys, monkeypatch):
+    """Each write of a training fails once, from the first on."""
+    import agents.training.run
+    from dms_core import output_place
+
+    full, known = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), output_place._replace
+
+    def replace(target, content):
+        if target.name == place:
+            raise full
+        known(target, content)
+
+    def configure(folder, *given):
+        raise full
+
+    monkeypatch.setattr(output_place, "_replace", replace)
+    if place == "tensorboard":
+        monkeypatch.setattr(agents.training.run, "configure", configure)
+    out = tmp_path / "run"
+    assert train("--config", config_file(tmp_path), "--out", out, "--set", "n_timesteps=64") in (1, 2)
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
+    assert len(said) == 1 and "No space left on device" in said[0] and "free some space" in said[0]
+    assert not [p for p in out.rglob("*") if p.name.startswith(".") and p.name != ".lock"]

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from dms_core.outputs import MANIFEST
 from exo_env.__main__ import main
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.paper.scenarios import FILES
@@ -32,7 +33,7 @@ def columns(folder, name: str) -> dict[str, np.ndarray]:
 
 
 def test_every_figure_and_table_is_there(folder):
-    names = {path.name for path in folder.iterdir()}
+    names = {path.name for path in folder.iterdir()} - {MANIFEST}
     assert {f"{name}.csv" for name in FILES} < names
     for number in FIGURES:
         (figure,) = (path for path in folder.iterdir() if path.name.startswith(f"fig{number:02d}_"))

@@ -8,6 +8,7 @@ import yaml
 
 from dms_core.config_files import config_file
 from dms_core.model.control.ziegler_nichols import STEP, oscillation
+from dms_core.outputs import MANIFEST
 from exo_env.__main__ import main
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.paper.tuning import START, StepExperiment, proportional
@@ -35,7 +36,9 @@ def test_the_command_finds_the_shipped_gains(device, tmp_path, capsys):
         assert getattr(device.gains, name) == pytest.approx(found[key], rel=2e-2)
     printed = capsys.readouterr().out
     assert "Kc = " in printed and "/ 500 = " in printed and "first-order lag of 1 ms" in printed
-    assert {p.name for p in tmp_path.iterdir()} == {"tuning.json", "fig06_critical_gain.png", "fig07_tuned.png"}
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "tuning.json", "fig06_critical_gain.png", "fig07_tuned.png", MANIFEST,
+    }  # fmt: skip
 
 
 def test_a_device_of_ones_own_is_tuned(device, tmp_path, capsys):
@@ -44,8 +47,8 @@ def test_a_device_of_ones_own_is_tuned(device, tmp_path, capsys):
     content["actuator"]["time_constant"] *= 2.0
     path = tmp_path / "slow.yaml"
     path.write_text(yaml.safe_dump(content))
-    assert main(["tune", "--out", str(tmp_path), "--exoskeleton", str(path)]) == 0
-    critical = json.loads((tmp_path / "tuning.json").read_text())["Kc_N_per_rad"]
+    assert main(["tune", "--out", str(tmp_path / "out"), "--exoskeleton", str(path)]) == 0
+    critical = json.loads((tmp_path / "out" / "tuning.json").read_text())["Kc_N_per_rad"]
     assert critical == pytest.approx(0.5 * device.tuning.Kc, rel=0.1)
     assert "first-order lag of 2 ms" in capsys.readouterr().out
 

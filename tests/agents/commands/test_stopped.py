@@ -1,0 +1,133 @@
+"""Ctrl-C in commands: status 130, a sentence on what is kept, and no traceback, of no process."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from agents.__main__ import main
+from agents.commands.report_input import collected
+from agents.evaluation.tuning import Try, _pool
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def stopped_at(monkeypatch):
+    """Makes Ctrl-C fall into a call of a function, counted from 1."""
+
+    def patch(place: str, number: int):
+        from importlib import import_module
+
+        module, _, name = place.rpartition(".")
+        known, calls = getattr(import_module(module), name), []
+
+        def called(*given, **more):
+            calls.append(1)
+            if len(calls) == number:
+                raise KeyboardInterrupt
+            return known(*given, **more)
+
+        monkeypatch.setattr(place, called)
+
+    return patch
+
+
+EVALUATE = ["evaluate", "--policy", "none", "pid", "--population", "stroke_mild", "--patients", "2"]
+
+
+def test_an_evaluation_keeps_the_policies_that_are_done(stopped_at, tmp_path, capsys):
+    stopped_at("agents.evaluation.evaluate.episode", 4)
+    assert main([*EVALUATE, "--out", str(tmp_path)]) == 130
+    part = tmp_path / "evaluation.partial.json"
+    assert capsys.readouterr().err.splitlines()[-1] == f"stopped: 2 patients with none are in '{part}'."
+    assert not (tmp_path / "evaluation.json").exists()
+    found = json.loads(part.read_text())
+    assert list(found["policies"]) == ["none"] and found["patients"] == 2
+    # A report takes it as any evaluation.
+    assert len(collected([part])[1]) == 1
+
+
+def test_an_evaluation_keeps_whole_patients_of_its_first_policy(stopped_at, tmp_path, capsys):
+    stopped_at("agents.evaluation.evaluate.episode", 4)
+    assert main([*EVALUATE, "--loads", "1", "2", "--out", str(tmp_path)]) == 130
+    found = json.loads((tmp_path / "evaluation.partial.json").read_text())
+    assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 2
+    assert "1 patients with none" in capsys.readouterr().err
+
+
+def test_an_evaluation_that_did_nothing_says_so(stopped_at, tmp_path, capsys):
+    stopped_at("agents.evaluation.evaluate.episode", 1)
+    assert main([*EVALUATE, "--out", str(tmp_path)]) == 130
+    assert "no patient was done; nothing was written." in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_an_upper_bound_keeps_its_patients(stopped_at, tmp_path, capsys):
+    stopped_at("agents.evaluation.upper_bound.tried_on", 2)
+    out = tmp_path / "bound.csv"
+    assert main(["upper-bound", "--patients", "3", "--population", "stroke_mild", "--out", str(out)]) == 130
+    lines = (tmp_path / "bound.partial.csv").read_text().splitlines()
+    assert not out.exists() and len(lines) == 3 and "1 of 3 patients are in" in capsys.readouterr().err
+
+
+def test_a_search_keeps_its_tries(monkeypatch, tmp_path, capsys):
+    def search(name, *given, progress, **more):
+        progress(Try(name, {"x": 1.0}, {"return": 2.0}))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("agents.commands.tune_baselines.tune", search)
+    assert main(["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]) == 130
+    (part,) = tmp_path.iterdir()
+    assert part.name == "baselines_tries.partial.csv" and part.read_text().endswith(",2,x=1\n")
+    assert "1 of " in (said := capsys.readouterr().err) and str(part) in said
+
+
+def test_a_film_is_whole_or_not_there(stopped_at, tmp_path, capsys):
+    pytest.importorskip("imageio")
+    pytest.importorskip("pygame")
+    stopped_at("agents.commands.video.band", 3)
+    assert main(["video", "--policy", "none", "--out", str(tmp_path / "film.gif")]) == 130
+    assert "2 of " in (said := capsys.readouterr().err) and "nothing was written" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+def test_processes_of_a_pool_end_without_a_word(capfd):
+    begin = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt), _pool(2) as pool:
+        tried = pool.map(time.sleep, [60.0] * 20)
+        threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+        next(tried)
+    assert capfd.readouterr().err == ""
+    assert time.perf_counter() - begin < 20.0  # not the 60 s of a job
+
+
+SCRIPT = """
+import sys, time
+from dms_core.command_line import run_command
+def wait() -> int:
+    print("waiting", flush=True)
+    time.sleep(60.0)
+    return 0
+sys.exit(run_command({"wait": wait, "other": wait}, "test", "", ["wait"]))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_one_line_and_status_130(number):
+    with subprocess.Popen(
+        [sys.executable, "-c", SCRIPT], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        watchdog = threading.Timer(120.0, process.kill)
+        watchdog.start()
+        assert process.stdout.readline() == "waiting\n"
+        os.kill(process.pid, number)
+        _, said = process.communicate()
+        watchdog.cancel()
+    assert process.returncode == 130 and said == "stopped: nothing was written.\n"
