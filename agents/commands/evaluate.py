@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,6 +9,7 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.errors import DmsError, InputError
+from dms_core.json_text import finite
 from dms_core.output_file import check_writable, whole_file, write_json
 from exo_env.rendering.panels import require_matplotlib
 
@@ -70,7 +70,7 @@ def evaluate(
             results = shared_out(used, plan, address=address, progress=progress)
         else:
             results = results_of(used, [episodes_of(one, plan, plan.cases, progress) for one in used], plan)
-    write_json(out / "evaluation.json", _json(results))
+    write_json(out / "evaluation.json", finite(results))
     _draw(out / "evaluation.png", results)
     with whole_file(out / "evaluation.md") as file:
         file.write("\n".join(whole_table(results)))
@@ -99,12 +99,3 @@ def policies() -> int:
         one = find_policy(name)
         print(f"{name:18} {one.title}; action mode {one.action_mode}, sees {', '.join(one.observation)}")
     return 0
-
-
-def _json(value: Any) -> Any:
-    """JSON has no NaN: what could not be measured is null."""
-    if isinstance(value, dict):
-        return {k: _json(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_json(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -10,14 +10,14 @@ from typing import Any
 from dms_core.errors import InputError
 
 from ..evaluation.evaluate import differences
+from ..evaluation.evaluation_file import read_evaluation
 from ..evaluation.pooling import pooled
 from ..evaluation.report_figures import Group
 from ..training.config import Config
-from ..training.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
+from ..training.records import RECORD, read_curve, read_record
+from ..training.run_folder import CONFIG
 
 EVALUATION = "evaluation.json"
-BEFORE = "exo/ElbowLift-v0"
-"""Environment of evaluations from before they said it."""
 
 
 def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], list[dict[str, Any]]]:
@@ -32,15 +32,13 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
     evaluations: dict[tuple[Any, ...], dict[str, Any]] = {}
     for path in paths:
         if (path / RECORD).is_file():
-            trainings[path] = _json(path / EVALUATIONS) if (path / EVALUATIONS).is_file() else []
+            trainings[path] = read_curve(path)
         elif path.is_file() or (path / EVALUATION).is_file():
-            one = _json(path if path.is_file() else path / EVALUATION)
-            if not isinstance(one, dict) or not {"population", "patients", "seed", "policies"} <= one.keys():
-                raise InputError(f"'{path}' is not an evaluation.")
-            one.setdefault("environment", BEFORE)
+            one = read_evaluation(path if path.is_file() else path / EVALUATION)
             settings = json.dumps({"repetitions": 1} | one.get("settings", {}), sort_keys=True)
             key = (
                 *(one[k] for k in ("environment", "population", "patients", "seed")), settings, *one.get("loads", ()),
+                *(e["seed"] for e in next(iter(one["policies"].values()))["episodes"]),
             )  # fmt: skip
             known = evaluations.setdefault(key, {**one, "policies": {}})
             known["policies"] |= one["policies"]
@@ -52,13 +50,6 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
         for p in known["policies"].values():
             p["difference"] = differences(p["episodes"], first, known["seed"], p.get("trainings", 1))
     return trainings, list(evaluations.values())
-
-
-def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read: {error}.") from None
 
 
 def grouped(trainings: Mapping[Path, list[dict[str, Any]]]) -> list[Group]:
