@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -121,7 +122,7 @@ def _as_mapping(content: Any) -> dict[str, Any]:
 
 def _unlabelled(kind: type[Checked], error: InputError) -> str:
     """What is wrong without the class, which is no word of the file's author."""
-    return "\n".join(line.removeprefix(f"{kind.__name__}: ") for line in str(error).splitlines())
+    return "\n".join(re.sub(rf"^{kind.__name__}( '.*?')?: ", "", line) for line in str(error).splitlines())
 
 
 def _mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

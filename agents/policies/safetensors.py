@@ -17,7 +17,6 @@ import numpy as np
 from pydantic import FailFast, Field
 
 from dms_core.errors import InputError
-from dms_core.input_file import decoded
 from dms_core.json_text import brief, checked, parse_json
 from dms_core.validation import Checked
 
@@ -72,7 +71,11 @@ def _arrays(content: bytes) -> dict[str, np.ndarray]:
         raise InputError(f"the header claims {length} bytes: expected at most {LONGEST_HEADER}.")
     if length > len(content) - 8:
         raise InputError("it is cut off.")
-    header = parse_json(decoded("header", content[8 : 8 + length]), "the header")
+    try:
+        text = content[8 : 8 + length].decode()
+    except UnicodeDecodeError:
+        raise InputError("the header is not UTF-8 text.") from None
+    header = parse_json(text, "the header")
     if not isinstance(header, dict):
         raise InputError("the header is no mapping of keys to values.")
     header.pop("__metadata__", None)

@@ -1,0 +1,445 @@
+"""Files made to harm: refused in one sentence with file and key, before they cost time or memory."""
+
+import copy
+import json
+import os
+import pickle
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.__main__ import main
+from agents.checkpoint import Store
+from agents.commands.report_input import collected
+from agents.evaluation.evaluate import VERSION
+from agents.evaluation.evaluation_file import read_evaluation
+from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint
+from agents.policies.safetensors import from_bytes, to_bytes
+from agents.policies.tuned import Range, numbers
+from agents.training.records import read_curve, read_record
+from dms_core.errors import DmsError, InputError
+from dms_core.json_text import MOST_KEYS, MOST_VALUES, parse_json
+
+OLD = Path(__file__).with_name("before_the_move")
+ROOT = Path(__file__).parents[2]
+MEGABYTES, SECONDS = 500, 2.0
+"""What refusing a file may take, as a program of its own with what it imports (100 MB)."""
+
+
+@pytest.fixture
+def policy(tmp_path):
+    """A copy of the shipped policy, and its description."""
+    folder = tmp_path / "policy"
+    LearnedPolicy.load(SHIPPED / "learned").save(folder)
+    return folder, json.loads((folder / "policy.json").read_text())
+
+
+def written(folder, facts):
+    """A description whose own hash fits."""
+    (folder / "policy.json").write_text(json.dumps(facts | {"sha256": fingerprint(facts)}))
+
+
+@pytest.mark.parametrize(
+    "said, changes",
+    [
+        ("lstm_layers = 1000000000: Expected a number of at most", {"lstm_layers": 10**9}),
+        ("lstm_layers = -1", {"lstm_layers": -1}),
+        ("lstm_width", {"lstm_layers": 1, "lstm_width": 0}),
+        ("hidden.0 = 1000000000", {"hidden": [10**9]}),
+        ("hidden.0 = 0", {"hidden": [0]}),
+        ("hidden = ", {"hidden": [1] * 100_000}),
+        ("traces = ", {"traces": [0.5] * 100_000}),
+        ("traces.0 = 'x'", {"traces": ["x"] * 100_000}),
+        ("inputs = 1000000000", {"inputs": 10**9}),
+        ("n_stack = 1000000000", {"n_stack": 10**9}),
+        ("a multiple of", {"n_stack": 5, "inputs": 7}),
+        ("hold = True", {"hold": True}),
+        ("clip = 0", {"clip": 0}),
+        ("outputs = '2'", {"outputs": "2"}),
+        ("activation 'x' is unknown", {"activation": "x"}),
+        ("have shape", {"hidden": [64, 65]}),
+    ],
+)
+def test_an_architecture_that_would_fill_the_memory_is_refused(said, changes, policy):
+    folder, facts = policy
+    facts["architecture"] |= changes
+    written(folder, facts)
+    with pytest.raises(InputError) as caught:
+        LearnedPolicy.load(folder)
+    assert said in str(caught.value) and "policy" in str(caught.value) and len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(
+    "key, value",
+    [
+        ("title", "Another"), ("environment", "exo/ElbowLift-v0"), ("exo_env", "9"), ("period", 0.01), ("seed", 1),
+        ("action_mode", "rope_tension"), ("observation", ["device.angle"]), ("drive", {}), ("env_kwargs", {}),
+        ("structure", []), ("algorithm", "sac"), ("steps", 1),
+    ],
+)  # fmt: skip
+def test_a_description_that_was_edited_is_named(key, value, policy):
+    folder, facts = policy
+    (folder / "policy.json").write_text(json.dumps(facts | {key: value}))
+    with pytest.raises(InputError, match="policy.json was changed"):
+        LearnedPolicy.load(folder)
+    # Layout and order of a file are no change.
+    (folder / "policy.json").write_text("\ufeff" + json.dumps(dict(reversed(facts.items()))), encoding="utf-8")
+    assert LearnedPolicy.load(folder).description.title == facts["title"]
+
+
+@pytest.mark.parametrize("name", ["clip", "epsilon", "output", "hold"])
+def test_an_architecture_that_was_edited_is_named(name, policy):
+    folder, facts = policy
+    facts["architecture"][name] = {"clip": 5.0, "epsilon": 1e-3, "output": "tanh", "hold": 9}[name]
+    (folder / "policy.json").write_text(json.dumps(facts))
+    with pytest.raises(InputError, match="policy.json was changed"):
+        LearnedPolicy.load(folder)
+
+
+def test_every_shipped_policy_holds_its_hash():
+    for folder in SHIPPED.glob("*/"):
+        facts = json.loads((folder / "policy.json").read_text())
+        assert facts["format"] == 2 and facts["sha256"] == fingerprint(facts)
+
+
+def test_a_policy_of_the_first_format_is_renewed(tmp_path, capsys):
+    assert main(["export", str(OLD / "policy"), "--no-onnx", "--out", str(tmp_path / "new")]) == 0
+    assert f"renew it: python -m agents export {OLD / 'policy'} --out" in capsys.readouterr().err
+    new = LearnedPolicy.load(tmp_path / "new")
+    assert new.description.format == 1 + 1 and new.training == "e3e190e250772dd1"  # as evaluation.json of then has it
+    facts = json.loads((tmp_path / "new" / "policy.json").read_text())
+    (tmp_path / "new" / "policy.json").write_text(json.dumps(facts | {"format": 1}))
+    with pytest.raises(InputError, match="policy.json was changed"):
+        LearnedPolicy.load(tmp_path / "new")
+
+
+def test_no_module_is_imported_because_a_file_names_it(policy, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "harm.py").write_text("raise SystemExit('harm was imported')")
+    folder, facts = policy
+    written(folder, facts | {"environment": "harm:exo/ElbowLift-v1"})
+    with pytest.raises(InputError, match="an id without a module"):
+        LearnedPolicy.load(folder)
+    found = json.loads((OLD / "evaluation.json").read_text()) | {"environment": "harm:exo/ElbowLift-v1"}
+    (tmp_path / "evaluation.json").write_text(json.dumps(found))
+    with pytest.raises(InputError, match="environment = 'harm:"):
+        read_evaluation(tmp_path / "evaluation.json")
+
+
+def test_a_policy_acts_where_it_was_begun_and_on_its_own_observations(policy):
+    one = LearnedPolicy.load(policy[0])
+    size = one.network.shape.observed
+    with pytest.raises(InputError, match=r"call reset\(env\)"):
+        one(np.zeros(size), {})
+    for shape in ((size + 1,), (1, size), ()):
+        with pytest.raises(InputError, match="the observation has shape"):
+            one.network(np.zeros(shape))
+
+
+def header(text):
+    return struct.pack("<Q", len(text)) + text.encode()
+
+
+WHOLE = '{"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}}'
+
+
+@pytest.mark.parametrize(
+    "said, content",
+    [
+        ("the header claims 1152921504606846976 bytes", struct.pack("<Q", 1 << 60) + b"{}"),
+        ("it is cut off", struct.pack("<Q", 100) + b"{}"),
+        ("it is cut off", header(WHOLE) + bytes(12)),
+        ("array 'a' stands at bytes (0, 8): expected (0, 16)", header(WHOLE.replace("F32", "F64")) + bytes(8)),
+        ("array 'a': dtype = 'F16'", header(WHOLE.replace("F32", "F16")) + bytes(8)),
+        ("array 'a': shape.0 = -2", header(WHOLE.replace("[2]", "[-2]")) + bytes(8)),
+        ("array 'a': shape = ", header(WHOLE.replace("[2]", f"[{'1,' * 99}2]")) + bytes(8)),
+        ("array 'a': shape.0 = 1000000000000000000", header(WHOLE.replace("[2]", f"[{10**18}]")) + bytes(8)),
+        ("array 'a': shape.0 = True", header(WHOLE.replace("[2]", "[true]")) + bytes(8)),
+        ("the key 'a' stands twice", header(f"{WHOLE[:-1]},{WHOLE[1:]}") + bytes(8)),
+        ("array 'b' stands at bytes (4, 12)", header(
+            WHOLE[:-1] + ',"b":{"dtype":"F32","shape":[2],"data_offsets":[4,12]}}') + bytes(12)),
+        ("nested deeper", header("[" * 5000) + bytes(8)),
+        ("is no mapping", header("[]")),
+    ],
+)  # fmt: skip
+def test_headers_of_safetensors(said, content):
+    with pytest.raises(InputError) as caught:
+        from_bytes(content, "x")
+    assert said in str(caught.value) and "file 'x' holds no whole safetensors" in str(caught.value)
+    assert len(str(caught.value)) < 400
+    assert from_bytes(header(WHOLE) + bytes(8), "x")["a"].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "said, text",
+    [
+        ("it is empty", ""), ("NaN is no number", '{"a": NaN}'), ("Infinity is no number", "[-Infinity]"),
+        ("1e400 is not finite", "[1e400]"), ("has 5000 characters", "9" * 5000), ("stands twice", '{"a": 1, "a": 1}'),
+        ("lone surrogate", '"\\udc00"'), ("nested deeper", "[" * 100_000), ("nested deeper", "[" * 51 + "]" * 51),
+        ("more than", f"[{'0,' * MOST_VALUES}0]"), ("keys", json.dumps({str(k): 0 for k in range(MOST_KEYS + 1)})),
+        ("Expecting value", '{"a": '), ("Extra data", "{} {}"),
+    ],
+)  # fmt: skip
+def test_what_json_may_not_hold(said, text):
+    with pytest.raises(InputError) as caught:
+        parse_json(text, "file 'x'")
+    assert said in str(caught.value) and str(caught.value).startswith("file 'x' ") and len(str(caught.value)) < 200
+    assert parse_json('{"a": [1, 2.5, null, "\\ud83d\\ude00"]}', "x") == {"a": [1, 2.5, None, "\U0001f600"]}
+
+
+PLACES = {
+    "policy.json": lambda folder: LearnedPolicy.load(folder),
+    "weights.safetensors": lambda folder: LearnedPolicy.load(folder),
+    "evaluation.json": lambda folder: collected([folder / "evaluation.json"]),
+    "run.json": lambda folder: read_record(folder),
+    "evaluations.json": lambda folder: read_curve(folder),
+    "latest": lambda folder: Store(folder).latest(),
+}
+
+
+def _fifo(path):
+    os.mkfifo(path)
+
+
+def _large(path):
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+
+
+OTHERS = {
+    "folder": Path.mkdir, "pipe": _fifo, "device": lambda path: path.symlink_to("/dev/zero"), "large": _large,
+    "utf-16": lambda path: path.write_text("{}", encoding="utf-16"),
+    "binary": lambda path: path.write_bytes(bytes(range(256))), "empty": Path.touch,
+}  # fmt: skip
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pipes among files")
+@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("name", PLACES)
+def test_what_stands_in_the_place_of_a_file(name, other, policy):
+    folder, _ = policy
+    (folder / name).unlink(missing_ok=True)
+    OTHERS[other](folder / name)
+    if (name, other) in {("evaluations.json", o) for o in ("folder", "pipe", "device")}:
+        assert PLACES[name](folder) == []  # none yet
+        return
+    with pytest.raises(InputError) as caught:
+        PLACES[name](folder)
+    assert str(folder) in str(caught.value) and "\n" not in str(caught.value)
+
+
+HARM = {
+    "deep": '"[" * 30_000_000',
+    "values": '"[" + "[],{}," * 5_000_000 + "0]"',
+    "traces": """text.replace('"traces": [', '"traces": [' + '"x",' * 249_000)""",
+    "numbers": """text.replace('"traces": [', '"traces": [' + '0.5,' * 240_000)""",
+    "strings": """text.replace('"title": "', '"title": "' + 'x' * 1_000_000)""",
+    "structure": """text.replace('"structure": [', '"structure": [' + '1,' * 499_000)""",
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the peak of the memory as Linux says it")
+@pytest.mark.parametrize("file", ["policy.json", "evaluation.json"])
+@pytest.mark.parametrize("harm", HARM)
+def test_time_and_memory_are_bounded(file, harm, policy):
+    if file == "evaluation.json" and harm in ("traces", "numbers", "strings", "structure"):
+        pytest.skip("keys of a policy")
+    code = f"""
+import resource, sys, time
+from pathlib import Path
+from agents.evaluation.evaluation_file import read_evaluation
+from agents.policies.learned import LearnedPolicy
+from dms_core.errors import DmsError, InputError
+folder = Path(sys.argv[1])
+text = (folder / 'policy.json').read_text()
+(folder / {file!r}).write_text({HARM[harm]})
+before = time.process_time()
+try:
+    LearnedPolicy.load(folder) if {file!r} == 'policy.json' else read_evaluation(folder / {file!r})
+except InputError as error:
+    print(len(str(error)), time.process_time() - before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+    done = subprocess.run([sys.executable, "-c", code, policy[0]], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr[-2000:]
+    length, seconds, megabytes = map(float, done.stdout.split())
+    assert length < 500 and seconds < SECONDS and megabytes < MEGABYTES
+
+
+@pytest.fixture
+def evaluation(tmp_path):
+    """A file, and what it holds."""
+    return tmp_path / "evaluation.json", json.loads((OLD / "evaluation.json").read_text())
+
+
+def changed(content, path, value):
+    """A copy with another value; a missing one where it is `...`."""
+    found = copy.deepcopy(content)
+    *way, last = path
+    place = found
+    for key in way:
+        place = place[key]
+    if value is ...:
+        del place[last]
+    else:
+        place[last] = value
+    return found
+
+
+EPISODE = ("policies", "pid", "episodes", 1)
+
+
+@pytest.mark.parametrize(
+    "said, path, value",
+    [
+        (f"of version {VERSION + 1}: expected at most {VERSION}", ("version",), VERSION + 1),
+        ("version = '1'", ("version",), "1"),
+        ("'policies' is missing", ("policies",), ...),
+        ("policies = {}", ("policies",), {}),
+        ("'confidence' is missing", ("confidence",), ...),
+        ("confidence = 2", ("confidence",), 2),
+        ("seed = -1", ("seed",), -1),
+        ("patients = 0", ("patients",), 0),
+        ("patients = 1000000000", ("patients",), 10**9),
+        ("2 episodes of 2 patients: expected 1 of each of 3", ("patients",), 3),
+        ("2 episodes of 2 patients: expected 3 of each of 2", ("loads",), [1.0, 2.0, 3.0]),
+        ("loads.0 = 'x'", ("loads",), ["x"] * 10**5),
+        ("repetitions = 'x'", ("settings",), {"repetitions": "x"}),
+        ("'patient' is no setting", ("settings",), {"patient": "stroke_mild"}),
+        ("policies: pid: episodes = []", ("policies", "pid", "episodes"), []),
+        ("policies: pid: episodes: 1: seed = 'x'", (*EPISODE, "seed"), "x"),
+        ("policies: pid: expected a mapping", ("policies", "pid"), None),
+        ("policies: pid: expected a mapping", ("policies", "pid"), 3),
+        ("policies: pid: episodes: 1: measures = ", (*EPISODE, "measures", "return"), None),
+        ("'unsafe' is missing", (*EPISODE, "measures", "unsafe"), ...),
+        ("expected the measures of the first episode", (*EPISODE, "measures", "other"), 1.0),
+        ("measures.return = True", (*EPISODE, "measures", "return"), True),
+        ("expected episodes of the same patients", ("policies", "policy", "episodes", 0, "seed"), 2),
+        ("summary: return: 'low' is missing", ("policies", "pid", "summary", "return", "low"), ...),
+        ("summary: return: count = -1", ("policies", "pid", "summary", "return", "count"), -1),
+        ("summary: unknown: expected", ("policies", "pid", "summary", "unknown"), 1),
+        ("summary = ", ("policies", "pid", "summary", "return"), ...),
+        ("title = ''", ("policies", "pid", "title"), ""),
+        ("unknown key 'wings'", ("wings",), 1),
+        ("left_out = 1", ("left_out",), 1),
+    ],
+)
+def test_damaged_and_newer_evaluations(said, path, value, evaluation):
+    file, content = evaluation
+    file.write_text(json.dumps(changed(content, path, value)))
+    with pytest.raises(InputError) as caught:
+        collected([file])
+    assert (
+        said in str(caught.value)
+        and str(file) in str(caught.value)
+        and "\n" not in str(caught.value)
+        and len(str(caught.value)) < 500
+    )
+
+
+def test_evaluations_say_their_version_and_older_ones_are_read(evaluation):
+    file, content = evaluation
+    assert "version" not in content
+    for version in ({}, {"version": VERSION}):
+        file.write_text(json.dumps(content | version))
+        _, (found,) = collected([file])
+        assert list(found["policies"]) == ["pid", "policy"]
+
+
+def test_evaluations_with_other_patients_stay_apart(evaluation, tmp_path):
+    file, content = evaluation
+    other = copy.deepcopy(content)
+    for policy in other["policies"].values():
+        policy["episodes"].reverse()
+    file.write_text(json.dumps(content))
+    (tmp_path / "other.json").write_text(json.dumps(other))
+    _, found = collected([file, tmp_path / "other.json"])
+    assert len(found) == 2
+
+
+@pytest.mark.parametrize(
+    "said, pointer, hashes",
+    [
+        ("expected the name of a folder", "../steps_1", None),
+        ("expected the name of a folder", "", None),
+        ("expected the name of a folder", "a\x00b", None),
+        ("latest' cannot be read: it has more than", "x" * 10_000, None),
+        ("hashes.json", "steps_1", "[]"),
+        ("hashes.json", "steps_1", "{}"),
+        ("hashes.json", "steps_1", '{"file": 3}'),
+        ("is not the name of a file", "steps_1", '{"../file": "x"}'),
+        ("file is cut off or was changed", "steps_1", '{"file": "x"}'),
+        ("other", "steps_1", '{"other": "x"}'),
+        ("nested deeper", "steps_1", "[" * 10_000),
+    ],
+)
+def test_damaged_checkpoints(said, pointer, hashes, tmp_path):
+    store = Store(tmp_path / "store")
+    store.save("steps_1", lambda part: (part / "file").write_text("content"))
+    (store.folder / "latest").write_text(pointer)
+    if hashes is not None:
+        (store.folder / "steps_1" / "hashes.json").write_text(hashes)
+    with pytest.raises(InputError) as caught:
+        store.latest()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 500
+
+
+def test_archives_that_unpack_to_more_than_they_are(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    from agents.training.model_state import _read
+
+    path = tmp_path / "random.npz"
+    np.savez_compressed(path, torch=np.zeros(10**7, np.uint8))
+    with pytest.raises(InputError, match="it is compressed"):
+        _read(path)
+    # An array that claims what no memory holds.
+    with zipfile.ZipFile(path, "w") as archive:
+        shape = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }"
+        archive.writestr("a.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(shape)) + shape)
+    with pytest.raises(InputError, match=r"random.npz' is cut off or no NumPy archive"):
+        _read(path)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x80\x04",
+        b"cnowhere\nNothing\n.",
+        b"\x80\x04\x95\xff\xff\xff\xff\xff\xff\xff\x7f",
+        pickle.dumps([1]),
+        b"x" * 99,
+    ],
+)
+def test_damaged_pickles_are_one_sentence(content, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    from agents.export.model_zip import _read, _statistics
+    from agents.training.algorithms import find
+
+    path = tmp_path / "vecnormalize.pkl"
+    path.write_bytes(content)
+    for read in (_statistics, lambda p: _read(find("ppo"), p)):
+        with pytest.raises(DmsError) as caught:
+            read(path)
+        assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", ["1", None, True, float("nan"), [1], 10**400, "x" * 10**6])
+def test_numbers_of_baselines(value):
+    with pytest.raises(InputError) as caught:
+        numbers("pid_yielding", {"authority": Range(0.0, 1.0), "lag_deg": Range(-1.0, 3.0)}, {"authority": value})
+    said = str(caught.value)
+    if value is not True:
+        assert "authority = " in said and "expected a number from 0 to 1" in said
+    assert len(said) < 300
+
+
+def test_safetensors_that_are_written_are_read():
+    arrays = {"b": np.arange(6.0).reshape(2, 3), "a": np.zeros((0, 4), np.float32), "c": np.float64(3.0)}
+    found = from_bytes(to_bytes(arrays), "x")
+    assert all(np.array_equal(found[k], v) for k, v in arrays.items())
