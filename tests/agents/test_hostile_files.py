@@ -333,12 +333,8 @@ def test_damaged_and_newer_evaluations(said, path, value, evaluation):
     file.write_text(json.dumps(changed(content, path, value)))
     with pytest.raises(InputError) as caught:
         collected([file])
-    assert (
-        said in str(caught.value)
-        and str(file) in str(caught.value)
-        and "\n" not in str(caught.value)
-        and len(str(caught.value)) < 500
-    )
+    assert said in str(caught.value) and str(file) in str(caught.value)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 500
 
 
 def test_evaluations_say_their_version_and_older_ones_are_read(evaluation):
