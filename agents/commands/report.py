@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from dms_core.errors import InputError
+from dms_core.json_text import brief
 from dms_core.output_file import check_writable, whole_file
 from exo_env.patient.population import population, shipped_populations
 from exo_env.rendering.panels import require_matplotlib
@@ -182,4 +183,8 @@ def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -
             f"the evaluation of '{results['population']}' holds no patients, whose episodes could be shown again."
         )
     kept = {k: one[k] for k in ("load", "reference") if k in one}
-    return time_course(policy, one["patient"], one["seed"], kept, **settings)
+    try:
+        return time_course(policy, one["patient"], one["seed"], kept, **settings)
+    except InputError as error:
+        said = brief(str(error))
+        raise InputError(f"the evaluation of '{results['population']}', seed {one['seed']}: {said}") from None

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
+from dms_core.json_text import brief
 
+from ..environment import check_settings
 from ..evaluation.evaluate import differences
 from ..evaluation.evaluation_file import read_evaluation
 from ..evaluation.pooling import pooled
@@ -35,6 +37,7 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
             trainings[path] = read_curve(path)
         elif path.is_file() or (path / EVALUATION).is_file():
             one = read_evaluation(path if path.is_file() else path / EVALUATION)
+            _check_settings(path, one)
             settings = json.dumps({"repetitions": 1} | one.get("settings", {}), sort_keys=True)
             key = (
                 *(one[k] for k in ("environment", "population", "patients", "seed")), settings, *one.get("loads", ()),
@@ -50,6 +53,14 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
         for p in known["policies"].values():
             p["difference"] = differences(p["episodes"], first, known["seed"], p.get("trainings", 1))
     return trainings, list(evaluations.values())
+
+
+def _check_settings(path: Path, one: Mapping[str, Any]) -> None:
+    """Whether the environment takes the settings of an evaluation, before anything is drawn."""
+    try:
+        check_settings(one["environment"], one.get("settings", {}))
+    except InputError as error:
+        raise InputError(f"evaluation '{path}': {brief(str(error))}") from None
 
 
 def grouped(trainings: Mapping[Path, list[dict[str, Any]]]) -> list[Group]:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, FailFast, Field
+from pydantic import AfterValidator, FailFast, Field, model_validator
 
 from dms_core.errors import InputError
 from dms_core.json_text import Each, brief, checked, read_json
@@ -22,8 +22,8 @@ BEFORE = "exo/ElbowLift-v0"
 NEEDED = ("return", "unsafe")
 """Measures that every episode has, as numbers."""
 NOT_SETTINGS = (
-    "action_mode", "disable_env_checker", "environment", "id", "max_episode_steps", "observation", "patient",
-    "render_mode", "vectorization_mode",
+    "action_mode", "disable_env_checker", "environment", "id", "max_episode_steps", "observation", "options", "patient",
+    "policy", "render_mode", "seed", "self",
 )  # fmt: skip
 """What an environment is given beside the settings of an evaluation."""
 Count = Annotated[int, Field(strict=True, ge=0)]
@@ -56,6 +56,12 @@ class EstimateFields(Checked):
     high: Number | None
     count: Count
 
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.low is not None and self.high is not None and self.low > self.high:
+            raise ValueError(f"low = {self.low:g}: expected a number of at most {self.high:g}, the end of the interval")
+        return self
+
 
 Summary = Annotated[dict[str, Any], Each(EstimateFields)]
 
@@ -63,7 +69,7 @@ Summary = Annotated[dict[str, Any], Each(EstimateFields)]
 class EpisodeFields(Checked):
     """An episode."""
 
-    seed: Count
+    seed: Annotated[Count, Field(le=1 << 64)]
     event: str | None
     measures: Annotated[Measured, AfterValidator(_needed)]
     load: Number | None = None
@@ -75,7 +81,7 @@ class EpisodeFields(Checked):
 class PolicyFields(Checked):
     """A policy's episodes, and what is estimated from them."""
 
-    title: str = Field(min_length=1)
+    title: str = Field(min_length=1, max_length=300)
     training: str | None = None
     summary: Annotated[Summary, AfterValidator(_needed)]
     summary_able: Summary = {}
@@ -88,7 +94,7 @@ class EvaluationFields(Checked):
 
     version: int = Field(default=0, strict=True, ge=0)
     environment: str = Field(default=BEFORE, pattern="^[^:]*$", description="id; a module in a file would be run")
-    population: str
+    population: str = Field(max_length=1000)
     patients: int = Field(strict=True, ge=1, le=10_000, description="intervals of more do not fit into a memory")
     seed: Count
     loads: Annotated[list[Number], FailFast()] = []
@@ -118,7 +124,10 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     for policy in content["policies"].values():
         for kind in ("summary", "summary_able", "difference"):
             for estimate in policy.setdefault(kind, {}).values():
-                estimate.update({k: math.nan for k, v in estimate.items() if v is None})
+                estimate |= {k: math.nan if (v := estimate[k]) is None else float(v) for k in ("value", "low", "high")}
+        for one in policy["episodes"]:
+            # A whole number of JSON may be too large for NumPy's.
+            one["measures"] = {k: None if v is None else float(v) for k, v in one["measures"].items()}
     return content
 
 

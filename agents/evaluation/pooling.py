@@ -12,8 +12,8 @@ def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """Trainings that differ in nothing but the seed, as one: its numbers are means over the trainings."""
     groups: dict[tuple[str, str | None], list[Any]] = {}
     for one in policies.values():
-        name, seeded, _ = one["title"].rpartition(", seed ")
-        if seeded.strip():
+        name, seeded, number = one["title"].rpartition(", seed ")
+        if seeded and number.strip():
             groups.setdefault((name, one.get("training")), []).append(one)
     together: dict[str, Any] = {}
     for (name, _), ones in groups.items():

@@ -66,7 +66,7 @@ class Description(Settings):
     """What a policy is, and the environment it knows."""
 
     format: int = Field(default=FORMAT, ge=1, le=FORMAT, strict=True, description="of the folder")
-    title: str
+    title: str = Field(max_length=300)
     algorithm: str
     environment: str
     exo_env: str = Field(description="version it was trained with")

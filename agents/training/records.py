@@ -36,7 +36,7 @@ class CurvePoint(Checked):
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Number | None]
-    steps: Count
+    steps: Annotated[Count, Field(le=1 << 60)]
     seconds: Number
     mean: Number = Field(alias="return")
     returns: Annotated[list[Number], FailFast()] = []
@@ -56,7 +56,7 @@ Curve = Annotated[list[Any], Each(CurvePoint), AfterValidator(_rising)]
 class State(Checked):
     """A checkpoint's counters."""
 
-    steps: Count
+    steps: Annotated[Count, Field(le=1 << 60)]
     updates: Count
     episodes: Count
     seconds: Number
@@ -90,7 +90,8 @@ def read_curve(folder: Path) -> list[dict[str, Any]]:
         return []
     content = read_json(folder / EVALUATIONS)
     checked(_Curve, {"evaluations": content}, f"file '{folder / EVALUATIONS}'")
-    return content
+    # A whole number of JSON may be too large for NumPy's.
+    return [{k: float(v) if k != "steps" and isinstance(v, int) else v for k, v in point.items()} for point in content]
 
 
 def read_state(checkpoint: Path) -> dict[str, Any]:

@@ -16,8 +16,10 @@ import pytest
 from agents.__main__ import main
 from agents.checkpoint import Store
 from agents.commands.report_input import collected
-from agents.evaluation.evaluate import VERSION
+from agents.environment import ENVIRONMENT, make
+from agents.evaluation.evaluate import VERSION, evaluate
 from agents.evaluation.evaluation_file import read_evaluation
+from agents.evaluation.time_course import time_course
 from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint
 from agents.policies.safetensors import from_bytes, to_bytes
 from agents.policies.tuned import Range, numbers
@@ -139,6 +141,65 @@ def test_a_policy_acts_where_it_was_begun_and_on_its_own_observations(policy):
     for shape in ((size + 1,), (1, size), ()):
         with pytest.raises(InputError, match="the observation has shape"):
             one.network(np.zeros(shape))
+
+
+def by_evaluation(one, settings):
+    evaluate([one], "stroke_mild", 1, 0, **settings)
+
+
+def by_time_course(one, settings):
+    time_course(one, "stroke_mild", 0, **settings)
+
+
+def by_video(one, settings):
+    pytest.importorskip("pygame")
+    from agents.commands.video import Stage
+
+    Stage(one, "stroke_mild", 0, **settings)
+
+
+def by_hand(one, settings):
+    env = make(ENVIRONMENT, action_mode=one.action_mode, observation=list(one.observation), **settings)
+    env.reset(seed=0)
+    one.reset(env)
+
+
+@pytest.mark.parametrize("path", [by_evaluation, by_time_course, by_video, by_hand])
+@pytest.mark.parametrize(
+    "said, settings",
+    [
+        ("another control period: 0.02, not 0.01", {"control_rate": 100.0}),
+        ("another drive", {"drive_settings": {"setpoint_range_deg": 3.0}}),
+    ],
+)
+def test_a_policy_is_refused_elsewhere_whoever_runs_it(said, settings, path, policy):
+    with pytest.raises(InputError, match=f"was trained with {said}"):
+        path(LearnedPolicy.load(policy[0]), settings)
+
+
+@pytest.mark.parametrize(
+    "said, changes",
+    [
+        ("another action mode", {"action_mode": "rope_tension"}),
+        ("another observation", {"observation": ["device.angle"]}),
+        ("another observation", {"observation": ["device", "emg"]}),
+    ],
+)
+def test_an_environment_of_another_mode_or_observation_is_refused(said, changes, policy):
+    one = LearnedPolicy.load(policy[0])
+    env = make(ENVIRONMENT, **{"action_mode": one.action_mode, "observation": list(one.observation), **changes})
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=said):
+        one.reset(env)
+
+
+def test_ropes_in_another_order_are_another_observation(policy):
+    folder, facts = policy
+    tension = next(part for part in facts["structure"] if part["name"] == "tension")
+    tension["labels"].reverse()
+    written(folder, facts)
+    with pytest.raises(InputError, match="another observation"):
+        by_hand(LearnedPolicy.load(folder), {})
 
 
 def header(text):
@@ -309,6 +370,12 @@ EPISODE = ("policies", "pid", "episodes", 1)
         ("2 episodes of 2 patients: expected 3 of each of 2", ("loads",), [1.0, 2.0, 3.0]),
         ("loads.0 = 'x'", ("loads",), ["x"] * 10**5),
         ("repetitions = 'x'", ("settings",), {"repetitions": "x"}),
+        ("setting 'foo' is unknown", ("settings",), {"foo": 1}),
+        ("exoskeleton = 3", ("settings",), {"exoskeleton": 3}),
+        ("environment 'exo/Nothing-v1' is not registered", ("environment",), "exo/Nothing-v1"),
+        ("low = 1", ("policies", "pid", "summary", "unsafe", "low"), 1),
+        ("title = 'xxxx", ("policies", "pid", "title"), "x" * 1000),
+        ("'self' is no setting", ("settings",), {"self": 1}),
         ("'patient' is no setting", ("settings",), {"patient": "stroke_mild"}),
         ("policies: pid: episodes = []", ("policies", "pid", "episodes"), []),
         ("policies: pid: episodes: 1: seed = 'x'", (*EPISODE, "seed"), "x"),
@@ -344,6 +411,32 @@ def test_evaluations_say_their_version_and_older_ones_are_read(evaluation):
         file.write_text(json.dumps(content | version))
         _, (found,) = collected([file])
         assert list(found["policies"]) == ["pid", "policy"]
+
+
+@pytest.mark.parametrize(
+    "path, value",
+    [
+        (("policies", "pid", "title"), "PPO, seed "),
+        (("policies", "pid", "title"), "$\\frac{$"),
+        (("population",), "$\\frac{$"),
+        (("policies", "pid", "summary", "tracking_rms_deg", "value"), 1e9),
+        (("policies", "pid", "summary", "tracking_rms_deg", "value"), None),
+        ((*EPISODE, "measures", "tracking_rms_deg"), None),
+        ((*EPISODE, "measures", "return"), 10**90),
+    ],
+)
+def test_unusual_evaluations_are_drawn(path, value, evaluation, tmp_path):
+    pytest.importorskip("matplotlib")
+    from agents.commands.report import _badness, _evaluation
+    from agents.evaluation.figure import draw
+
+    file, content = evaluation
+    file.write_text(json.dumps(changed(content, path, value)))
+    _, (found,) = collected([file])
+    assert any("pid" in line for line in _evaluation(tmp_path, found, ""))
+    assert max(found["policies"]["pid"]["episodes"], key=_badness)
+    draw(tmp_path / "evaluation.png", found)
+    assert {p.name for p in tmp_path.glob("*.png")} == {"pareto.png", "evaluation.png"}
 
 
 def test_evaluations_with_other_patients_stay_apart(evaluation, tmp_path):
