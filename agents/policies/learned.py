@@ -178,7 +178,19 @@ class LearnedPolicy(Policy):
                 difference = brief(f"{trained}, not {here}")
                 raise InputError(f"policy '{self.name}' was trained with another {what}: {difference}.")
         self.network.reset()
+        if not self._known:
+            self._say_where(env)
         self._known = True
+
+    def _say_where(self, env: gymnasium.Env) -> None:
+        """Say where an environment is another one that shows and takes the same: it may reward something else."""
+        trained, here = environment_id(self.description.environment, say=False), getattr(env.spec, "id", None)
+        if here not in (trained, None):
+            warnings.warn(
+                f"policy '{self.name}' was trained in {trained} and acts in {here}, which shows and takes the same.",
+                ModelWarning,
+                stacklevel=3,
+            )
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
         """The action held best.

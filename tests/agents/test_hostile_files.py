@@ -24,7 +24,7 @@ from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint
 from agents.policies.safetensors import from_bytes, to_bytes
 from agents.policies.tuned import Range, numbers
 from agents.training.records import read_curve, read_record
-from dms_core.errors import DmsError, InputError
+from dms_core.errors import DmsError, InputError, ModelWarning
 from dms_core.json_text import MOST_KEYS, MOST_VALUES, parse_json
 
 OLD = Path(__file__).with_name("before_the_move")
@@ -169,7 +169,7 @@ def by_hand(one, settings):
     "said, settings",
     [
         ("another control period: 0.02, not 0.01", {"control_rate": 100.0}),
-        ("another drive", {"drive_settings": {"setpoint_range_deg": 3.0}}),
+        ("another drive", {"drive_settings": {"setpoint_range": 0.1}}),
     ],
 )
 def test_a_policy_is_refused_elsewhere_whoever_runs_it(said, settings, path, policy):
@@ -191,6 +191,18 @@ def test_an_environment_of_another_mode_or_observation_is_refused(said, changes,
     env.reset(seed=0)
     with pytest.raises(InputError, match=said):
         one.reset(env)
+
+
+def test_another_environment_that_looks_the_same_is_said(policy):
+    import gymnasium
+
+    one = LearnedPolicy.load(policy[0])
+    gymnasium.register("tests/Twin-v0", entry_point=gymnasium.spec(ENVIRONMENT).entry_point)
+    env = make("tests/Twin-v0", action_mode=one.action_mode, observation=list(one.observation))
+    env.reset(seed=0)
+    with pytest.warns(ModelWarning, match=f"was trained in {ENVIRONMENT} and acts in tests/Twin-v0"):
+        one.reset(env)
+    del gymnasium.registry["tests/Twin-v0"]
 
 
 def test_ropes_in_another_order_are_another_observation(policy):
@@ -315,7 +327,7 @@ import resource, sys, time
 from pathlib import Path
 from agents.evaluation.evaluation_file import read_evaluation
 from agents.policies.learned import LearnedPolicy
-from dms_core.errors import DmsError, InputError
+from dms_core.errors import DmsError, InputError, ModelWarning
 folder = Path(sys.argv[1])
 text = (folder / 'policy.json').read_text()
 (folder / {file!r}).write_text({HARM[harm]})
