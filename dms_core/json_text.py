@@ -23,7 +23,7 @@ from dms_core.validation import Checked
 Kind = TypeVar("Kind", bound=Checked)
 MOST_BYTES = 64 << 20
 """Size up to which a file is read [byte]: an evaluation of ten thousand episodes has half of it."""
-LONGEST_SENTENCE = 300
+LONGEST_SENTENCE = 240
 """Characters of a sentence on a file's contents, which may be of any length."""
 DEEPEST, MOST_KEYS, MOST_VALUES, LONGEST_INTEGER = 50, 1_000, 1_000_000, 100
 """Levels of nesting, keys of a mapping, values of a file, and characters of a whole number."""

@@ -60,7 +60,7 @@ def from_bytes(content: bytes, where: str | Path) -> dict[str, np.ndarray]:
     try:
         return _arrays(content)
     except InputError as error:
-        raise InputError(f"file '{where}' holds no whole safetensors: {error}") from None
+        raise InputError(f"file '{where}' holds no whole safetensors: {brief(str(error))}") from None
 
 
 def _arrays(content: bytes) -> dict[str, np.ndarray]:
