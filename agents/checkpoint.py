@@ -13,10 +13,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dms_core.errors import InputError
+from dms_core.input_file import decoded, digest, read_bytes
+from dms_core.json_text import brief, read_json
 from dms_core.output_file import write_text
-from dms_core.outputs import digest
 
 POINTER, HASHES = "latest", "hashes.json"
+LONGEST_NAME, MOST_HASHES = 1 << 12, 1 << 20
+"""Sizes up to which pointer and hashes are read [byte]."""
 
 
 class Store:
@@ -72,16 +75,23 @@ class Store:
         """
         if self.empty:
             raise InputError(f"'{self.folder}' is empty: the training has not reached its first checkpoint.")
-        path = self.folder / (self.folder / POINTER).read_text(encoding="utf-8").strip()
+        path = self.folder / self._pointed()
         try:
-            hashes = json.loads((path / HASHES).read_text(encoding="utf-8"))
+            hashes = read_hashes(path)
             bad = [name for name, known in hashes.items() if digest(path / name) != known]
-        except (OSError, ValueError, AttributeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else f"{HASHES} is no whole JSON"
-            raise InputError(f"checkpoint '{path}' cannot be read ({reason}).{self._others(path)}") from None
+        except InputError as error:
+            raise InputError(f"checkpoint '{path}' is not whole: {error}{self._others(path)}") from None
         if bad:
             raise InputError(f"checkpoint '{path}': {bad[0]} is cut off or was changed.{self._others(path)}")
         return path
+
+    def _pointed(self) -> str:
+        """Name of the newest checkpoint."""
+        pointer = self.folder / POINTER
+        name = decoded(pointer, read_bytes(pointer, LONGEST_NAME)).strip()
+        if not is_name(name):
+            raise InputError(f"file '{pointer}' holds '{brief(name, 60)}': expected the name of a folder beside it.")
+        return name
 
     def _others(self, path: Path) -> str:
         """Where to go on from instead."""
@@ -97,6 +107,27 @@ class Store:
         for path in folders:
             if path not in whole[-self.keep :]:
                 shutil.rmtree(path, ignore_errors=True)
+
+
+def read_hashes(checkpoint: Path) -> dict[str, str]:
+    """Hashes of a checkpoint's files by their names.
+
+    Raises:
+        InputError: they are missing, or not whole.
+    """
+    path = checkpoint / HASHES
+    hashes = read_json(path, MOST_HASHES)
+    if not isinstance(hashes, dict) or not hashes or not all(isinstance(x, str) for x in hashes.values()):
+        raise InputError(f"file '{path}': expected the hash of each file by its name.")
+    for name in hashes:
+        if not is_name(name):
+            raise InputError(f"file '{path}': '{brief(name, 60)}' is not the name of a file beside it.")
+    return hashes
+
+
+def is_name(text: str) -> bool:
+    """Whether a text is the name of something in a folder, and leads nowhere else."""
+    return text.isprintable() and text not in ("", ".", "..") and not {"/", "\\"} & set(text)
 
 
 def _to_disk(path: Path) -> None:

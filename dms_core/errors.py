@@ -4,13 +4,16 @@ MOST_CHARACTERS = 4000
 """Length of a message; what it quotes may be of any length."""
 
 
+def both_ends(text: str, most: int) -> str:
+    """A text without its middle where it is longer than `most` characters: what is wrong, and what would be right."""
+    return text if len(text) <= most else f"{text[: most // 2]} [...] {text[-most // 2 :]}"
+
+
 class DmsError(Exception):
     """Base of every error that dms_core raises on purpose. Of a long message both ends are kept."""
 
     def __init__(self, message: str = "") -> None:
-        if len(message) > MOST_CHARACTERS:
-            message = f"{message[: MOST_CHARACTERS // 2]} [...] {message[-MOST_CHARACTERS // 2 :]}"
-        super().__init__(message)
+        super().__init__(both_ends(message, MOST_CHARACTERS))
 
 
 class ModelError(DmsError, ValueError):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from dms_core.errors import InputError
 
 MOST_BYTES = 4_000_000
 """Largest file of settings [bytes]; a model of a thousand bodies has a tenth of it."""
+BLOCK = 1 << 20
+"""Read at once [bytes]."""
 _KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
           (stat.S_ISSOCK, "a socket"))  # fmt: skip
 _OTHER_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
@@ -57,3 +61,30 @@ def decoded(path: str | Path, content: bytes) -> str:
         other = _OTHER_ENCODINGS.get(content[:2])
         what = f"it is {other} text" if other else f"it is not UTF-8 text (byte {error.start + 1})"
         raise InputError(f"file '{path}' cannot be read: {what}. Save it as UTF-8.") from None
+
+
+def opened(path: Path) -> BinaryIO:
+    """A regular file of any size, to read; a pipe or a device might never end.
+
+    Raises:
+        InputError: it is missing, something else, or cannot be read; names it.
+    """
+    if path.exists() and not path.is_file():
+        raise InputError(f"file '{path}' cannot be read: expected a regular file.")
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise InputError(f"file '{path}' cannot be read: {error.strerror}.") from None
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a regular file.
+
+    Raises:
+        InputError: it cannot be read; names it.
+    """
+    hashed = hashlib.sha256()
+    with opened(path) as file:
+        while block := file.read(BLOCK):
+            hashed.update(block)
+    return hashed.hexdigest()

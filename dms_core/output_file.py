@@ -6,7 +6,6 @@ import contextlib
 import csv
 import io
 import json
-import math
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import IO, Any
 import numpy as np
 
 from dms_core.errors import InputError
+from dms_core.json_text import finite
 from dms_core.output_place import Content, check_kind, put
 from dms_core.outputs import active_outputs
 
@@ -133,16 +133,7 @@ def _head(names: list[str]) -> bytes:
 
 def write_json(path: str | Path, content: Any) -> None:
     """Indented JSON; JSON has no NaN: what is not finite is null."""
-    write_text(path, json.dumps(_finite(content), indent=2, allow_nan=False) + "\n")
-
-
-def _finite(value: Any) -> Any:
-    """A copy with None for numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    write_text(path, json.dumps(finite(content), indent=2, allow_nan=False) + "\n")
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -7,7 +7,6 @@ only with --overwrite: a file is known by its first or last bytes, a folder by a
 from __future__ import annotations
 
 import errno
-import hashlib
 import json
 import os
 import re
@@ -19,11 +18,12 @@ from types import TracebackType
 from typing import NamedTuple
 
 from dms_core.errors import DmsError, InputError, Stopped
+from dms_core.input_file import digest
 from dms_core.output_place import Content, cannot, check_folder, check_writable, descriptor, identity, is_file, put
 
 MANIFEST = ".written.json"
 """List of a folder's files with their hashes."""
-HEAD, TAIL, BLOCK = 1 << 20, 1 << 16, 1 << 20
+HEAD, TAIL = 1 << 20, 1 << 16
 """Bytes in which a file's mark is looked for, and bytes read at once."""
 _active: list[Outputs] = []
 
@@ -240,15 +240,6 @@ def partial(path: Path) -> Path:
         count += 1
         part = path.with_name(f"{path.stem}.partial{count}{path.suffix}")
     return part
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file."""
-    hashed = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(BLOCK):
-            hashed.update(block)
-    return hashed.hexdigest()
 
 
 def _hash(path: Path) -> str | None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
 from dms_core.errors import InputError
+from dms_core.json_text import brief, parse_json
 
 from ..policies.learned import repetitions_of
 from ..policies.policy import Policy
@@ -25,12 +25,10 @@ def device_settings(exoskeleton: str | None) -> dict[str, Any]:
         return {}
     if not exoskeleton.lstrip().startswith(("{", "[")):
         return {"exoskeleton": exoskeleton}
-    try:
-        changes = json.loads(exoskeleton)
-    except ValueError as error:
-        raise InputError(f"--exoskeleton {exoskeleton}: expected a name, a YAML file or JSON: {error}.") from None
+    said = f"--exoskeleton {brief(exoskeleton, 60)}"
+    changes = parse_json(exoskeleton, f"{said}: expected a name, a YAML file or JSON, which")
     if not isinstance(changes, dict):
-        raise InputError(f'--exoskeleton {exoskeleton}: expected a mapping, for example {{"hinge_damping": 0.1}}.')
+        raise InputError(f'{said}: expected a mapping, for example {{"hinge_damping": 0.1}}.')
     return {"exoskeleton": changes}
 
 

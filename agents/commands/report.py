@@ -10,6 +10,7 @@ from tyro.conf import Positional, arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError
+from dms_core.json_text import brief
 from dms_core.output_file import markdown_cell, one_line, write_text
 from dms_core.outputs import Outputs
 from exo_env.patient.population import population, shipped_populations
@@ -113,9 +114,6 @@ def _number(value: float | None) -> str:
 
 def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
     """Figure and table of an evaluation."""
-    for policy in results["policies"].values():
-        for estimate in policy["summary"].values():
-            estimate.update({k: float("nan") for k, v in estimate.items() if v is None})
     if not all(name in p["summary"] for p in results["policies"].values() for name in report_figures.PARETO):
         return whole_table(results)
     report_figures.pareto(out / f"pareto{suffix}.png", results)
@@ -157,11 +155,11 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
     episodes = results["policies"][judged.name]["episodes"]
     worst = max(episodes, key=_badness)
     m = worst["measures"]
-    why = "ended early" if m["unsafe"] else "largest error" if "tracking_rms_deg" in m else "least return"
+    why = "ended early" if m["unsafe"] else "largest error" if m.get("tracking_rms_deg") is not None else "least return"
     columns = {f"{why} of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
     report_figures.time_courses(out / "worst_patient.png", columns)
     sentence = worst["event"] or f"return {m['return']:.4g}"
-    if not worst["event"] and "tracking_rms_deg" in m:
+    if not worst["event"] and m.get("tracking_rms_deg") is not None:
         sentence = f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
     return [
         f"## Worst patient of {one_line(judged.title)}",
@@ -176,7 +174,8 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
 def _badness(one: Mapping[str, Any]) -> tuple[float, float]:
     """What the worst episode has most of: an early end, then error, or lack of return where there is no reference."""
     m = one["measures"]
-    return m["unsafe"], m.get("tracking_rms_deg", -m["return"])
+    error = m.get("tracking_rms_deg")
+    return m["unsafe"], -m["return"] if error is None else error
 
 
 def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -> TimeCourse:
@@ -191,5 +190,13 @@ def _again(policy: Policy, one: Mapping[str, Any], results: Mapping[str, Any]) -
     if known and results.get("environment", ENVIRONMENT) == environment:
         load = {"load": one["load"]} if results.get("loads") else None
         return time_course(policy, known[0], one["seed"], load, **settings)
+    if "patient" not in one:
+        raise InputError(
+            f"the evaluation of '{results['population']}' holds no patients, whose episodes could be shown again."
+        )
     kept = {k: one[k] for k in ("load", "reference") if k in one}
-    return time_course(policy, one["patient"], one["seed"], kept, **settings)
+    try:
+        return time_course(policy, one["patient"], one["seed"], kept, **settings)
+    except InputError as error:
+        said = brief(str(error))
+        raise InputError(f"the evaluation of '{results['population']}', seed {one['seed']}: {said}") from None

@@ -8,16 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
+from dms_core.json_text import brief
 
+from ..environment import check_settings
 from ..evaluation.evaluate import differences
+from ..evaluation.evaluation_file import read_evaluation
 from ..evaluation.pooling import pooled
 from ..evaluation.report_figures import Group
 from ..training.config import Config
-from ..training.run_folder import CONFIG, EVALUATIONS, RECORD, read_record
+from ..training.records import RECORD, read_curve, read_record
+from ..training.run_folder import CONFIG
 
 EVALUATION = "evaluation.json"
-BEFORE = "exo/ElbowLift-v0"
-"""Environment of evaluations from before they said it."""
 
 
 def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], list[dict[str, Any]]]:
@@ -32,15 +34,14 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
     evaluations: dict[tuple[Any, ...], dict[str, Any]] = {}
     for path in paths:
         if (path / RECORD).is_file():
-            trainings[path] = _json(path / EVALUATIONS) if (path / EVALUATIONS).is_file() else []
+            trainings[path] = read_curve(path)
         elif path.is_file() or (path / EVALUATION).is_file():
-            one = _json(path if path.is_file() else path / EVALUATION)
-            if not isinstance(one, dict) or not {"population", "patients", "seed", "policies"} <= one.keys():
-                raise InputError(f"'{path}' is not an evaluation.")
-            one.setdefault("environment", BEFORE)
+            one = read_evaluation(path if path.is_file() else path / EVALUATION)
+            _check_settings(path, one)
             settings = json.dumps({"repetitions": 1} | one.get("settings", {}), sort_keys=True)
             key = (
                 *(one[k] for k in ("environment", "population", "patients", "seed")), settings, *one.get("loads", ()),
+                *(e["seed"] for e in next(iter(one["policies"].values()))["episodes"]),
             )  # fmt: skip
             known = evaluations.setdefault(key, {**one, "policies": {}})
             known["policies"] |= one["policies"]
@@ -54,11 +55,12 @@ def collected(paths: Sequence[Path]) -> tuple[dict[Path, list[dict[str, Any]]], 
     return trainings, list(evaluations.values())
 
 
-def _json(path: Path) -> Any:
+def _check_settings(path: Path, one: Mapping[str, Any]) -> None:
+    """Whether the environment takes the settings of an evaluation, before anything is drawn."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read: {error}.") from None
+        check_settings(one["environment"], one.get("settings", {}))
+    except InputError as error:
+        raise InputError(f"evaluation '{path}': {brief(str(error))}") from None
 
 
 def grouped(trainings: Mapping[Path, list[dict[str, Any]]]) -> list[Group]:

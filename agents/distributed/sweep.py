@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
 
 from ..training.config import Config
-from ..training.run_folder import EVALUATIONS, RECORD, RunFolder
+from ..training.records import RECORD, read_curve
+from ..training.run_folder import RunFolder
 from ..training.usable import checked_config
 
 
@@ -59,6 +59,7 @@ def train_share(content: dict[str, Any], seed: int, folder: str) -> dict[str, An
 def steps_of(folder: Path) -> int:
     """How far a training is, as far as its last evaluation tells."""
     try:
-        return int(json.loads((folder / EVALUATIONS).read_text(encoding="utf-8"))[-1]["steps"])
-    except (OSError, ValueError, IndexError):
+        curve = read_curve(folder)
+    except InputError:
         return 0
+    return curve[-1]["steps"] if curve else 0

@@ -26,6 +26,8 @@ from .statistics import CONFIDENCE, RESAMPLES, estimate, interquartile_mean, mea
 
 COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
 """Measures whose differences between policies are estimated, patient by patient."""
+VERSION = 1
+"""Of what `evaluate` returns, which stands in evaluation.json."""
 Case = tuple[int, float | None]
 """Seed of an episode and its load [kg], None for the one that the seed draws."""
 
@@ -155,7 +157,7 @@ def results_of(policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any
             "difference": differences(those, episodes[0], plan.seed), "episodes": those,
         }  # fmt: skip
     return {
-        "environment": plan.id, "population": plan.title, "patients": plan.patients,
+        "version": VERSION, "environment": plan.id, "population": plan.title, "patients": plan.patients,
         "loads": list(plan.loads), "seed": plan.seed, "settings": dict(plan.settings),
         "statistic": "interquartile mean", "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE,
         "left_out": left, "policies": by_name,

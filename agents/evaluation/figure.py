@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import panels, save
+from exo_env.rendering.panels import literal, panels, save
 
 from .measures import MEASURES
 from .tables import heading, statistic
@@ -28,7 +28,7 @@ def draw(path: Path, results: dict[str, Any]) -> None:
         for k, name in enumerate(names):
             _row(ax, k, policies[name], m.name)
         ax.set_title(m.label if m.unit == "-" else f"{m.label} [{m.unit}]", fontsize=9)
-        ax.set_yticks(range(len(names)), [policies[n]["title"] for n in names])
+        ax.set_yticks(range(len(names)), [literal(policies[n]["title"]) for n in names])
         ax.set_ylim(len(names) - 0.5, -0.5)
         ax.grid(False, axis="y")
         if m.unit == "deg":
@@ -37,7 +37,7 @@ def draw(path: Path, results: dict[str, Any]) -> None:
             ax.xaxis.set_major_formatter("{x:g}")
     for ax in list(axes.flat)[len(shown) :]:
         ax.set_visible(False)
-    figure.suptitle(f"{heading(results)}\n{statistic(results)}", fontsize=9)
+    figure.suptitle(f"{literal(heading(results))}\n{statistic(results)}", fontsize=9)
     save(figure, path)
 
 

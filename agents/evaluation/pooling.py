@@ -12,14 +12,15 @@ def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """Trainings that differ in nothing but the seed, as one: its numbers are means over the trainings."""
     groups: dict[tuple[str, str | None], list[Any]] = {}
     for one in policies.values():
-        name, seeded, _ = one["title"].rpartition(", seed ")
-        if seeded:
+        name, seeded, number = one["title"].rpartition(", seed ")
+        if seeded and number.strip():
             groups.setdefault((name, one.get("training")), []).append(one)
     together: dict[str, Any] = {}
     for (name, _), ones in groups.items():
         titles, parts = [one["title"] for one in ones], [one["episodes"] for one in ones]
         seeds = {title.rpartition(", seed ")[2].split()[0] for title in titles}
-        if len(parts) == len(seeds) > 1 and len({len(part) for part in parts}) == 1:
+        alike = len({(len(part), *part[0]["measures"]) for part in parts}) == 1
+        if len(parts) == len(seeds) > 1 and alike:
             episodes, title = [e for part in parts for e in part], f"{name}, {len(parts)} seeds"
             title += f" ({len(together) + 1})" if title in together else ""
             together[title] = {

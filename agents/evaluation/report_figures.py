@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import legend, panels, save
+from exo_env.rendering.panels import legend, literal, panels, save
 
 from .figure import COLOURS
 from .time_course import TimeCourse
@@ -44,7 +44,7 @@ def learning_curves(path: Path, groups: Sequence[Group]) -> None:
             steps, values = on_common_steps(group.curves, name)
             colour, n = COLOURS[k % len(COLOURS)], len(group.curves)
             seeds = f"{n} seed{'s' * (n > 1)}"
-            ax.plot(steps, values.mean(axis=0), color=colour, marker=".", label=f"{group.label} ({seeds})")
+            ax.plot(steps, values.mean(axis=0), color=colour, marker=".", label=literal(f"{group.label} ({seeds})"))
             ax.fill_between(steps, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0.0)
         ax.set_xlabel("decisions")
         ax.set_title(label, fontsize=10)
@@ -98,9 +98,10 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
         other.set_ylabel("tracking error, rms: difference [deg]")
         left_out = [p["title"] for p in policies if p not in near]
         what = f"mean difference to {policies[0]['title']}, patient by patient"
-        other.set_title(what + (f"\n(far off: {', '.join(left_out)})" if left_out else ""), fontsize=9)
+        other.set_title(literal(what + (f"\n(far off: {', '.join(left_out)})" if left_out else "")), fontsize=9)
     percent = 100.0 * results["confidence"]
-    figure.supxlabel(f"{results['patients']} patients, {results['population']}; {percent:g} % intervals", fontsize=9)
+    whom = f"{results['patients']} patients, {results['population']}; {percent:g} % intervals"
+    figure.supxlabel(literal(whom), fontsize=9)
     legend(figure, ax, 3)
     save(figure, path)
 
@@ -117,10 +118,11 @@ def _points(ax: Any, shown: Sequence[Mapping[str, Any]], policies: Sequence[Mapp
         if pool is not None:
             ax.plot(one["value"], other["value"], ".", color=colour, markersize=4, zorder=3)
             continue
-        whiskers = [[[v["value"] - v["low"]], [v["high"] - v["value"]]] for v in (one, other)]
+        # A percentile interval of few patients may lie beside its value.
+        whiskers = [[[max(v["value"] - v["low"], 0.0)], [max(v["high"] - v["value"], 0.0)]] for v in (one, other)]
         ax.errorbar(
             one["value"], other["value"], xerr=whiskers[0], yerr=whiskers[1], color=colour, marker=marker, markersize=6,
-            linewidth=1.2, capsize=3, linestyle="", label=p["title"], alpha=0.8,
+            linewidth=1.2, capsize=3, linestyle="", label=literal(p["title"]), alpha=0.8,
         )  # fmt: skip
 
 
@@ -182,9 +184,9 @@ def time_courses(path: Path, columns: Mapping[str, Sequence[TimeCourse]]) -> Non
             column[0].plot(y["time"], degrees, color="0.55", linewidth=3.5, alpha=0.6, label="reference")
         for k, one in enumerate(ones):
             for ax, row in zip(column, rows, strict=True):
-                row.draw(ax, one.columns, COLOURS[k], one.policy)
+                row.draw(ax, one.columns, COLOURS[k], literal(one.policy))
             _mark_event(column[0], one, COLOURS[k])
-        column[0].set_title(f"{title}\n{ones[0].who}", fontsize=9)
+        column[0].set_title(literal(f"{title}\n{ones[0].who}"), fontsize=9)
         column[-1].set_xlabel("time [s]")
         column[-1].set_ylim(bottom=-0.05)
     for line, row in zip(axes, rows, strict=True):
@@ -203,9 +205,8 @@ def _mark_event(ax: Any, one: TimeCourse, colour: str) -> None:
         return
     end = one.columns["time"][-1], float(np.degrees(angle[-1]))
     ax.plot(*end, "x", color=colour, markersize=9, markeredgewidth=2.5)
-    ax.annotate(
-        _short(one.event), end, xytext=(8, 0), textcoords="offset points", va="center", fontsize=7, color=colour
-    )
+    said = literal(_short(one.event))
+    ax.annotate(said, end, xytext=(8, 0), textcoords="offset points", va="center", fontsize=7, color=colour)
 
 
 def _short(event: str) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pickle
-import zipfile
 from pathlib import Path
 from typing import Any
 
 from dms_core.errors import DmsError, InputError
+from dms_core.input_file import opened
+from dms_core.json_text import brief
 
 from ..environment import ENVIRONMENT, environment_id, make
 from ..policies.learned import LearnedPolicy
@@ -50,8 +51,8 @@ def from_zip(
     try:
         origin = Origin(environment_id(environment), algorithm, model.seed)
         return extract(model, env, origin, _statistics(statistics))
-    except AttributeError as error:
-        raise InputError(f"'{source}' is not a model of {algorithm}: {error}.") from None
+    except (AttributeError, TypeError, KeyError, IndexError) as error:
+        raise InputError(f"'{source}' is not a model of {algorithm}: {brief(str(error))}.") from None
     finally:
         env.close()
 
@@ -59,11 +60,12 @@ def from_zip(
 def _read(kind: Any, source: Path) -> Any:
     """A model, pickles and all."""
     try:
-        return kind.load(source, device="cpu")
-    except OSError as error:
-        raise InputError(f"'{source}' cannot be read: {error.strerror}.") from None
-    except (ValueError, RuntimeError, KeyError, TypeError, AssertionError, EOFError, zipfile.BadZipFile) as error:
-        reason = " ".join(str(error).split())[:200]
+        with opened(source) as file:
+            return kind.load(file, device="cpu")
+    except InputError:
+        raise
+    except Exception as error:  # what a damaged pickle raises has no common class
+        reason = brief(" ".join(str(error).split()) or type(error).__name__)
         raise InputError(f"'{source}' is no whole model of {kind.__name__}: {reason}") from None
 
 
@@ -74,12 +76,12 @@ def _statistics(path: Path | None) -> Any:
     from stable_baselines3.common.vec_env import VecNormalize
 
     try:
-        with path.open("rb") as file:
+        with opened(path) as file:
             content = pickle.load(file)
-    except OSError as error:
-        raise InputError(f"'{path}' cannot be read: {error.strerror}.") from None
-    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError) as error:
-        raise InputError(f"'{path}' is no whole pickle: {error}.") from None
+    except InputError:
+        raise
+    except Exception as error:  # what a damaged pickle raises has no common class
+        raise InputError(f"'{path}' is no whole pickle: {brief(str(error) or type(error).__name__)}.") from None
     if not isinstance(content, VecNormalize):
         raise DmsError(f"'{path}' holds a {type(content).__name__}: expected a VecNormalize.")
     return content

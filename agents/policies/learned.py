@@ -8,63 +8,103 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, ConfigDict, FailFast, Field
 
 from dms_core.config_files import configs
-from dms_core.errors import InputError, choices
+from dms_core.errors import InputError, ModelWarning, choices
+from dms_core.input_file import read_bytes
+from dms_core.json_text import Each, brief, checked, finite, read_json
 from dms_core.output_file import write_bytes, write_text
+from dms_core.validation import Checked
 from exo_env.settings import Settings
 
 from ..checkpoint import Store
 from ..environment import PROGRAM, environment_id
 from .baselines import POLICIES
 from .baselines import policy as baseline
-from .network import Architecture, Network
+from .network import Architecture, Count, Network
 from .policy import Policy
 from .safetensors import from_bytes, to_bytes
 
-DESCRIPTION, WEIGHTS, FORMAT = "policy.json", "weights.safetensors", 1
+DESCRIPTION, WEIGHTS, FORMAT = "policy.json", "weights.safetensors", 2
+"""Format 1 does not hold the hash of the description itself."""
+MOST_DESCRIPTION, MOST_WEIGHTS = 1 << 20, 128 << 20
+"""Sizes up to which the files are read [byte]."""
 SHIPPED = configs() / "policies"
-COMPARED = ("group", "name", "start", "stop", "unit", "scale")
+COMPARED = ("group", "name", "labels", "start", "stop", "unit", "scale")
 """What of each part of the observation has to be as in training."""
+
+
+def whole_repetitions(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings of an environment out of a file, whose repetitions are counted before an environment checks them."""
+    often = settings.get("repetitions", 1)
+    if type(often) is not int or often < 1:
+        raise ValueError(f"repetitions = {brief(repr(often), 60)}: expected a whole number of at least 1")
+    return settings
+
+
+class Part(Checked):
+    """What a description says of a part of the observation, as far as it is compared."""
+
+    model_config = ConfigDict(extra="ignore")
+    group: str
+    name: str
+    labels: Annotated[list[str], FailFast()]
+    start: Count
+    stop: Count
+    unit: str
+    scale: float = Field(strict=True)
 
 
 class Description(Settings):
     """What a policy is, and the environment it knows."""
 
-    format: int = Field(default=FORMAT, ge=FORMAT, le=FORMAT, description="of the folder")
-    title: str
+    format: int = Field(default=FORMAT, ge=1, le=FORMAT, strict=True, description="of the folder")
+    title: str = Field(max_length=300)
     algorithm: str
     environment: str
     exo_env: str = Field(description="version it was trained with")
-    env_kwargs: dict[str, Any] = Field(description="of the training environment")
+    env_kwargs: Annotated[dict[str, Any], AfterValidator(whole_repetitions)] = Field(
+        description="of the training environment"
+    )
     action_mode: str
-    observation: tuple[str, ...] = Field(description="groups, or channels as group.channel, in order")
-    structure: tuple[dict[str, Any], ...] = Field(description="of the observation: names, units, scales")
-    period: float = Field(gt=0.0, description="control period [s]")
+    observation: Annotated[tuple[str, ...], FailFast()] = Field(
+        description="groups, or channels as group.channel, in order"
+    )
+    structure: Annotated[tuple[Any, ...], Each(Part)] = Field(description="of the observation: names, units, scales")
+    period: float = Field(gt=0.0, strict=True, description="control period [s]")
     drive: dict[str, Any] = Field(description="what actions command")
     architecture: Architecture
-    steps: int = Field(ge=0, description="of training")
-    seed: int | None = None
+    steps: Count = Field(description="of training")
+    seed: Count | None = None
     weights_sha256: str = ""
+    sha256: str = Field(default="", description="of all other keys")
 
     @property
     def common(self) -> str:
         """A digest of all but steps, seed and weights: the same for trainings that differ in nothing but the seed."""
-        facts = self.model_dump(mode="json", exclude={"steps", "seed", "weights_sha256", "title"})
+        apart = {"format", "steps", "seed", "weights_sha256", "sha256", "title"}
+        facts = self.model_dump(mode="json", exclude=apart) | {"format": 1}  # as it was in format 1
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def fingerprint(facts: Mapping[str, Any]) -> str:
+    """SHA-256 of a description's keys and values but the hash itself, whatever their order and layout."""
+    others = {key: value for key, value in facts.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(others, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 
 def world_facts(env: gymnasium.Env) -> dict[str, Any]:
     """What a description holds of an environment."""
     world: Any = env.unwrapped
-    parts = [json.loads(json.dumps(part.as_dict())) for part in world.observation_structure]
+    parts = [json.loads(json.dumps(finite(part.as_dict()))) for part in world.observation_structure]
     return {
         "action_mode": world.action_mode,
         "observation": tuple(map(str, world.settings.observation)),
@@ -85,7 +125,7 @@ class LearnedPolicy(Policy):
 
     def __init__(self, description: Description, arrays: Mapping[str, np.ndarray], name: str = "learned") -> None:
         self.description, self.arrays = description, dict(arrays)
-        self.network = Network(description.architecture, arrays)
+        self.network, self._known = Network(description.architecture, arrays), False
         # A policy's own, where those of baselines are of the class.
         own: dict[str, Any] = {
             "name": name, "title": description.title, "action_mode": description.action_mode,
@@ -101,40 +141,33 @@ class LearnedPolicy(Policy):
             InputError: a file is missing, cut off, changed, or of another environment or format.
         """
         folder = Path(folder)
+        facts = read_json(folder / DESCRIPTION, MOST_DESCRIPTION)
+        content = read_bytes(folder / WEIGHTS, MOST_WEIGHTS)
+        description = checked(Description, facts, f"policy '{folder}': {DESCRIPTION}")
         try:
-            file = DESCRIPTION
-            facts = json.loads((folder / file).read_text(encoding="utf-8"))
-            file = WEIGHTS
-            content = (folder / file).read_bytes()
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise InputError(f"policy '{folder}' cannot be read: {file}: {reason}.") from None
-        except ValueError as error:
-            raise InputError(f"'{folder / DESCRIPTION}' is no JSON: {error}.") from None
-        if not isinstance(facts, dict):
-            raise InputError(f"'{folder / DESCRIPTION}' holds a {type(facts).__name__}: expected a mapping.")
-        try:
-            facts["architecture"] = Architecture(**facts.get("architecture", {}))
-            description = Description(**facts)
             _check_registered(description.environment)
-            if hashlib.sha256(content).hexdigest() != description.weights_sha256:
-                raise InputError(f"{WEIGHTS} is cut off or was changed: its SHA-256 is not that of {DESCRIPTION}.")
-            return cls(description, from_bytes(content, folder / WEIGHTS), name or str(folder))
-        except (InputError, TypeError) as error:
+            _check_whole(description, facts, content)
+            arrays = from_bytes(content, folder / WEIGHTS)
+            found = cls(description, arrays, name or str(folder))
+        except InputError as error:
             raise InputError(f"policy '{folder}': {error}") from None
+        if description.format == 1:
+            _warn_of_first_format(folder)
+        return found
 
     def save(self, folder: Path) -> None:
         """Write the folder; the description comes last, so that a folder with one is whole."""
         content = to_bytes(self.arrays)
         write_bytes(folder / WEIGHTS, content)
-        facts = self.description.model_dump(mode="json") | {"weights_sha256": hashlib.sha256(content).hexdigest()}
+        facts = finite(self.description.model_dump(mode="json"))
+        facts |= {"format": FORMAT, "weights_sha256": hashlib.sha256(content).hexdigest()}
+        facts |= {"sha256": fingerprint(facts)}
         write_text(folder / DESCRIPTION, json.dumps(facts, indent=2) + "\n")
 
     def reset(self, env: gymnasium.Env) -> None:
         """Forget the last patient; an environment that the policy does not know is refused."""
         facts, d = world_facts(env), self.description
-        mine = [[part[k] for k in COMPARED] for part in d.structure]
-        theirs = [[part[k] for k in COMPARED] for part in facts["structure"]]
+        mine, theirs = ([[part[k] for k in COMPARED] for part in parts] for parts in (d.structure, facts["structure"]))
         for what, trained, here in (
             ("observation", mine, theirs),
             ("action mode", d.action_mode, facts["action_mode"]),
@@ -142,20 +175,62 @@ class LearnedPolicy(Policy):
             ("drive", d.drive, facts["drive"]),
         ):
             if trained != here:
-                raise InputError(f"policy '{self.name}' was trained with another {what}: {trained}, not {here}.")
+                difference = brief(f"{trained}, not {here}")
+                raise InputError(f"policy '{self.name}' was trained with another {what}: {difference}.")
         self.network.reset()
+        if not self._known:
+            self._say_where(env)
+        self._known = True
+
+    def _say_where(self, env: gymnasium.Env) -> None:
+        """Say where an environment is another one that shows and takes the same: it may reward something else."""
+        trained, here = environment_id(self.description.environment, say=False), getattr(env.spec, "id", None)
+        if here not in (trained, None):
+            warnings.warn(
+                f"policy '{self.name}' was trained in {trained} and acts in {here}, which shows and takes the same.",
+                ModelWarning,
+                stacklevel=3,
+            )
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
-        """The action held best."""
+        """The action held best.
+
+        Raises:
+            InputError: the policy was not reset, so that nobody knows whether the environment is the one it knows.
+        """
+        if not self._known:
+            raise InputError(f"policy '{self.name}' acts without a begin: call reset(env) after the environment's own.")
         return self.network(observation)
 
 
 def _check_registered(environment: str) -> None:
     """What is observed and commanded is compared at each reset; here only whether the environment is known at all."""
+    if ":" in environment:
+        # A module that a file names would be imported, which is to run its code.
+        raise InputError(f"environment = '{brief(environment, 60)}': expected an id without a module.")
     try:
         environment_id(environment)
     except InputError as error:
-        raise InputError(f"it was trained in {environment}: {error}") from None
+        raise InputError(f"it was trained in {brief(environment, 60)}: {brief(str(error))}") from None
+
+
+def _check_whole(description: Description, facts: Mapping[str, Any], weights: bytes) -> None:
+    """Refuses files that are not as they were written."""
+    if (description.format > 1 or description.sha256) and description.sha256 != fingerprint(facts):
+        raise InputError(
+            f"{DESCRIPTION} was changed: its SHA-256 is not the one that it holds. Export the policy once more."
+        )
+    if hashlib.sha256(weights).hexdigest() != description.weights_sha256:
+        raise InputError(f"{WEIGHTS} is cut off or was changed: its SHA-256 is not that of {DESCRIPTION}.")
+
+
+def _warn_of_first_format(folder: Path) -> None:
+    warnings.warn(
+        f"policy '{folder}' is of format 1, which does not tell whether {DESCRIPTION} was changed by hand; if it was "
+        f"not, renew it: {PROGRAM} export {folder} --out NEW_FOLDER",
+        ModelWarning,
+        stacklevel=3,
+    )
 
 
 def find_policy(name: str) -> Policy:

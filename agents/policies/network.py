@@ -6,12 +6,13 @@ Numbers are double precision although PyTorch trains in single: what differs is 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import FailFast, Field, model_validator
 
 from dms_core.errors import InputError
+from dms_core.json_text import brief
 from exo_env.settings import Settings
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -24,24 +25,49 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 """Activations as PyTorch computes them with its default arguments."""
 
 
+Count = Annotated[int, Field(strict=True, ge=0)]
+Size = Annotated[int, Field(strict=True, ge=1, le=100_000)]
+"""Of a layer or an observation; far more than any network here has, and too little to fill a memory."""
+Share = Annotated[float, Field(strict=True, ge=0.0, lt=1.0)]
+Positive = Annotated[float, Field(strict=True, gt=0.0)]
+
+
 class Architecture(Settings):
     """Shape of a network; its numbers are arrays by name (`names`)."""
 
-    inputs: int = Field(ge=1, description="components of what it sees, stacked observations included")
-    n_stack: int = Field(default=1, ge=1, description="observations that it sees at once, the newest last")
-    hold: int = Field(default=1, ge=1, description="control periods of an action; what comes between is not looked at")
-    traces: tuple[float, ...] = Field(
-        default=(), description="shares that low-pass filters of what it sees keep from action to action, a filter each"
+    inputs: Size = Field(description="components of what it sees, stacked observations included")
+    n_stack: Size = Field(default=1, description="observations that it sees at once, the newest last")
+    hold: Size = Field(default=1, description="control periods of an action; what comes between is not looked at")
+    traces: Annotated[tuple[Share, ...], FailFast()] = Field(
+        default=(), max_length=100,
+        description="shares that low-pass filters of what it sees keep from action to action, a filter each",
+    )  # fmt: skip
+    hidden: Annotated[tuple[Size, ...], FailFast()] = Field(
+        max_length=100, description="widths of the layers before the output"
     )
-    hidden: tuple[int, ...] = Field(description="widths of the layers before the output")
-    outputs: int = Field(default=2, ge=1)
+    outputs: Size = 2
     activation: str = Field(description="between the layers")
-    lstm_layers: int = Field(default=0, ge=0, description="of LSTM cells before the layers")
-    lstm_width: int = Field(default=0, ge=0)
+    lstm_layers: Count = Field(default=0, le=100, description="of LSTM cells before the layers")
+    lstm_width: Count = Field(default=0, le=100_000)
     output: Literal["clip", "tanh"] = Field(description="how the output becomes an action from -1 to 1")
-    normalised: bool = Field(description="observations are normalised by `mean` and `variance`")
-    clip: float = Field(default=10.0, gt=0.0, description="largest normalised observation")
-    epsilon: float = Field(default=1e-8, gt=0.0, description="added to the variance")
+    normalised: bool = Field(strict=True, description="observations are normalised by `mean` and `variance`")
+    clip: Positive = Field(default=10.0, description="largest normalised observation")
+    epsilon: Positive = Field(default=1e-8, description="added to the variance")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        """Inputs are whole observations, and cells have a width."""
+        parts = self.n_stack * (1 + len(self.traces))
+        if self.inputs % parts:
+            raise ValueError(f"inputs = {self.inputs}: expected a multiple of n_stack and filters, {parts}")
+        if self.lstm_layers and not self.lstm_width:
+            raise ValueError("lstm_width = 0: expected a number of at least 1 where there are LSTM cells")
+        return self
+
+    @property
+    def observed(self) -> int:
+        """Components of one observation."""
+        return self.inputs // (self.n_stack * (1 + len(self.traces)))
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shape of each array."""
@@ -72,7 +98,8 @@ class Network:
 
     def __init__(self, shape: Architecture, arrays: Mapping[str, np.ndarray]) -> None:
         if shape.activation not in ACTIVATIONS:
-            raise InputError(f"activation '{shape.activation}' is unknown; there are {', '.join(ACTIVATIONS)}.")
+            named = brief(shape.activation, 60)
+            raise InputError(f"activation '{named}' is unknown; there are {', '.join(ACTIVATIONS)}.")
         for name, expected in shape.shapes().items():
             if name not in arrays:
                 raise InputError(f"the weights lack '{name}'.")
@@ -80,6 +107,8 @@ class Network:
                 raise InputError(f"weights '{name}' have shape {arrays[name].shape}: expected {expected}.")
             if not np.isfinite(arrays[name]).all():
                 raise InputError(f"weights '{name}' are not finite.")
+        if shape.normalised and (arrays["variance"] < 0.0).any():
+            raise InputError("weights 'variance' are below 0.")
         self.shape = shape
         self._arrays = {name: np.asarray(arrays[name], dtype=float) for name in shape.shapes()}
         self._activation = ACTIVATIONS[shape.activation]
@@ -95,7 +124,13 @@ class Network:
         self._cell = np.zeros((s.lstm_layers, s.lstm_width))
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """The action that the policy holds best, shape (outputs,), after one more observation."""
+        """The action that the policy holds best, shape (outputs,), after one more observation.
+
+        Raises:
+            InputError: the observation has not the shape of those in training.
+        """
+        if observation.shape != (self.shape.observed,):
+            raise InputError(f"the observation has shape {observation.shape}: expected ({self.shape.observed},).")
         if self._left == 0:
             self._action, self._left = self._decided(observation), self.shape.hold
         self._left -= 1

@@ -8,9 +8,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
+
+import numpy as np
 
 from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.json_text import brief
 from dms_core.yaml_text import read_yaml
 
 FILE = "baselines/baselines.yml"
@@ -35,7 +39,7 @@ class Range:
 
 
 @cache
-def _tuned() -> dict[str, dict[str, float]]:
+def _tuned() -> dict[str, Any]:
     return read_yaml(configs() / FILE)
 
 
@@ -50,11 +54,15 @@ def numbers(policy: str, ranges: dict[str, Range], given: dict[str, float]) -> d
     Raises:
         InputError: a number is unknown or outside its range.
     """
-    used = {**_tuned()[policy], **given}
+    tuned = _tuned().get(policy)
+    if not isinstance(tuned, dict):
+        raise InputError(f"'{configs() / FILE}' holds no numbers of '{policy}': expected a mapping. Reinstall exo-env.")
+    used = {**tuned, **given}
     if used.keys() != ranges.keys():
         raise InputError(f"policy '{policy}': its numbers are {', '.join(ranges)}, got {', '.join(used)}.")
     for name, value in used.items():
-        if not ranges[name].low <= value <= ranges[name].high:
-            r = ranges[name]
-            raise InputError(f"policy '{policy}': {name} = {value}: expected a number from {r.low:g} to {r.high:g}.")
+        r, number = ranges[name], isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not (number and r.low <= value <= r.high):
+            said = brief(repr(value), 60)
+            raise InputError(f"policy '{policy}': {name} = {said}: expected a number from {r.low:g} to {r.high:g}.")
     return used

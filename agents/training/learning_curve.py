@@ -18,9 +18,9 @@ from ..environment import make, patient_seeds
 from ..policies.learned import LearnedPolicy
 from .config import Config
 from .model_state import save_model
-from .run_folder import EVALUATIONS, RunFolder
+from .records import EVALUATIONS, STATE, read_point
+from .run_folder import RunFolder
 
-STATE = "state.json"
 Judge = Callable[[gymnasium.Env, LearnedPolicy, Sequence[int]], list[dict[str, Any]]]
 """Measures of a policy's episode with each seed, by name; "return" is one of them. What is measured is not decided
 here: who starts a training gives it (evaluation/episode.py)."""
@@ -75,7 +75,7 @@ class LearningCurve:
         if self.folder.best.empty:
             return -np.inf
         try:
-            return float(json.loads((self.folder.best.latest() / STATE).read_text(encoding="utf-8"))["return"])
+            return float(read_point(self.folder.best.latest())["return"])
         except InputError:
             return -np.inf
 

@@ -11,7 +11,7 @@ import random
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import torch
@@ -21,6 +21,8 @@ from stable_baselines3.common.save_util import load_from_zip_file, recursive_set
 from stable_baselines3.common.vec_env import VecNormalize
 
 from dms_core.errors import InputError
+from dms_core.input_file import opened
+from dms_core.json_text import brief
 from dms_core.output_file import write_bytes, write_file
 
 MODEL, STATISTICS, REPLAY, RANDOM = "model.zip", "statistics.npz", "replay.npz", "random.npz"
@@ -65,24 +67,37 @@ def load_state(model: BaseAlgorithm, folder: Path) -> None:
             _load_statistics(statistics, folder / STATISTICS)
         if isinstance(model, OffPolicyAlgorithm):
             _load_replay(model, folder / REPLAY)
-        arrays = _read(folder / RANDOM)
-        torch.set_rng_state(torch.from_numpy(arrays["torch"]))
-        position, has_gauss, gauss = arrays["numpy_rest"]
-        np.random.set_state(("MT19937", arrays["numpy"], int(position), int(has_gauss), float(gauss)))
-        random.setstate((3, tuple(int(x) for x in arrays["python"]), None))
+        _load_random(folder / RANDOM)
     except OSError as error:
         raise InputError(f"'{error.filename}' cannot be read: {error.strerror}.") from None
+
+
+def _load_random(path: Path) -> None:
+    """Random states of PyTorch, NumPy and Python."""
+    arrays = _read(path)
+    try:
+        position, has_gauss, gauss = arrays["numpy_rest"]
+        torch.set_rng_state(torch.from_numpy(arrays["torch"]))
+        np.random.set_state(("MT19937", arrays["numpy"], int(position), int(has_gauss), float(gauss)))
+        random.setstate((3, tuple(int(x) for x in arrays["python"]), None))
+    except (KeyError, ValueError, TypeError, RuntimeError, OverflowError) as error:
+        raise InputError(f"'{path}' does not hold random states: {brief(str(error))}.") from None
 
 
 def _load_networks(model: BaseAlgorithm, path: Path) -> None:
     """Weights and optimisers."""
     try:
-        _, tensors, variables = load_from_zip_file(io.BytesIO(path.read_bytes()), device=model.device, load_data=False)
+        with opened(path) as file:
+            _check_stored(file)
+            content = io.BytesIO(file.read())
+        _, tensors, variables = load_from_zip_file(content, device=model.device, load_data=False)
         model.set_parameters(tensors, exact_match=True, device=model.device)
         for name, value in (variables or {}).items():
             recursive_setattr(model, f"{name}.data", value.data)
-    except (ValueError, RuntimeError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        said = " ".join(str(error).split())[:200]
+    except (InputError, OSError):
+        raise
+    except Exception as error:  # what a damaged archive of tensors raises has no common class
+        said = brief(" ".join(str(error).split()) or type(error).__name__)
         raise InputError(f"'{path}' does not hold the networks of this configuration: {said}") from None
 
 
@@ -96,7 +111,10 @@ def _load_statistics(statistics: VecNormalize, path: Path) -> None:
     arrays = _read(path)
     for name, one in _running(statistics).items():
         mean, var = _of_shape(path, arrays, f"{name}_mean", one.mean), _of_shape(path, arrays, f"{name}_var", one.var)
-        one.mean, one.var, one.count = mean, var, float(arrays[f"{name}_count"])
+        count = _of_shape(path, arrays, f"{name}_count", 0.0)
+        if (var < 0.0).any() or count < 0.0:
+            raise InputError(f"'{path}': {name}_var or {name}_count is below 0.")
+        one.mean, one.var, one.count = mean, var, float(count)
 
 
 def _save_replay(model: OffPolicyAlgorithm, path: Path) -> None:
@@ -116,7 +134,12 @@ def _load_replay(model: OffPolicyAlgorithm, path: Path) -> None:
         if column is None or column.shape[1:] != place.shape[1:] or len(column) > len(place):
             raise InputError(f"'{path}' does not hold the replay buffer of this configuration: {name} does not fit.")
         place[: len(column)] = column
-    buffer.pos, buffer.full = int(arrays["place"][0]), bool(arrays["place"][1])
+    rows = {len(arrays[name]) for name in COLUMNS}
+    place = _of_shape(path, arrays, "place", (0, 0))
+    position, full = int(place[0]), bool(place[1])
+    if len(rows) > 1 or rows != {buffer.buffer_size if full else position} or not 0 <= position < buffer.buffer_size:
+        raise InputError(f"'{path}' does not hold the replay buffer of this configuration: place does not fit.")
+    buffer.pos, buffer.full = position, full
 
 
 def _write(path: Path, **arrays: Any) -> None:
@@ -126,14 +149,28 @@ def _write(path: Path, **arrays: Any) -> None:
 def _read(path: Path) -> Mapping[str, np.ndarray]:
     """Arrays of a file; pickles are refused."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return dict(arrays)
-    except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"'{path}' is cut off or no NumPy archive: {error}.") from None
+        with opened(path) as file:
+            _check_stored(file)
+            with np.load(file, allow_pickle=False) as arrays:
+                return dict(arrays)
+    except InputError:
+        raise
+    except Exception as error:  # what a damaged archive of arrays raises has no common class
+        said = brief(str(error) or type(error).__name__)
+        raise InputError(f"'{path}' is cut off or no NumPy archive: {said}.") from None
+
+
+def _check_stored(file: BinaryIO) -> None:
+    """Refuses compressed archives: these here are not, and a small one could unpack to more than the memory holds."""
+    with zipfile.ZipFile(file) as archive:
+        if any(one.file_size != one.compress_size for one in archive.infolist()):
+            raise zipfile.BadZipFile("it is compressed")
+    file.seek(0)
 
 
 def _of_shape(path: Path, arrays: Mapping[str, np.ndarray], name: str, like: Any) -> np.ndarray:
-    """An array that has to have the shape of another."""
-    if name not in arrays or arrays[name].shape != np.shape(like):
-        raise InputError(f"'{path}' does not hold the statistics of this configuration: {name} does not fit.")
-    return arrays[name]
+    """An array of finite numbers that has to have the shape of another."""
+    known = arrays.get(name)
+    if known is None or known.dtype.kind not in "fiub" or known.shape != np.shape(like) or not np.isfinite(known).all():
+        raise InputError(f"'{path}' does not hold what this configuration has: {name} does not fit.")
+    return known

@@ -23,8 +23,9 @@ from ..policies.learned import LearnedPolicy
 from .algorithms import build
 from .config import Config
 from .extraction import Origin, extract
-from .learning_curve import STATE, Judge, LearningCurve, checkpoint_name
+from .learning_curve import Judge, LearningCurve, checkpoint_name
 from .model_state import load_state, save_state
+from .records import STATE, read_state
 from .run_folder import RunFolder
 from .worlds import wrapped
 
@@ -203,9 +204,7 @@ def mixed(seed: int, steps: int) -> int:
 
 def _state(checkpoint: Path | None) -> dict[str, Any]:
     """Counters of a checkpoint; those of a start where there is none."""
-    if checkpoint is None:
-        return {"steps": 0}
-    return json.loads((checkpoint / STATE).read_text(encoding="utf-8"))
+    return {"steps": 0} if checkpoint is None else read_state(checkpoint)
 
 
 def _diverged(model: BaseAlgorithm, error: ValueError) -> bool:

@@ -11,7 +11,6 @@ tensorboard/
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import shlex
 import sys
@@ -29,8 +28,11 @@ from ..checkpoint import Store
 from ..environment import environment_id
 from ..provenance import revision, versions
 from .config import Config
+from .records import EVALUATIONS as EVALUATIONS
+from .records import RECORD as RECORD
+from .records import read_record as read_record
 
-RECORD, CONFIG, EVALUATIONS, LOCK = "run.json", "config.yml", "evaluations.json", ".lock"
+CONFIG, LOCK = "config.yml", ".lock"
 
 
 class RunFolder:
@@ -71,13 +73,13 @@ class RunFolder:
             InputError: the folder holds no training, or one of another environment.
         """
         record = read_record(self.path)
-        environment = environment_id(str(record["environment"]))
+        environment = environment_id(record["environment"])
         config = Config.read(self.path / CONFIG, overrides, environment)
         if overrides:
             self.write_config(config)
         record["sessions"].append(_session())
         write_json(self.path / RECORD, record)
-        return config, int(record["seed"])
+        return config, record["seed"]
 
     def write_config(self, config: Config) -> None:
         """Keep the configuration."""
@@ -104,23 +106,6 @@ class RunFolder:
             file.write(f"{os.getpid()}\n")
             file.flush()
             yield
-
-
-def read_record(path: Path) -> dict[str, Any]:
-    """run.json of a folder.
-
-    Raises:
-        InputError: there is none, or it is not whole.
-    """
-    try:
-        record = json.loads((path / RECORD).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"'{path}' is not the folder of a training: {RECORD}: {error.strerror}.") from None
-    except ValueError as error:
-        raise InputError(f"'{path / RECORD}' is no JSON: {error}.") from None
-    if not isinstance(record, dict) or not {"environment", "seed", "sessions"} <= record.keys():
-        raise InputError(f"'{path / RECORD}' is not the record of a training.")
-    return record
 
 
 def _session() -> dict[str, Any]:

@@ -7,6 +7,7 @@ the result are those of tests/reference/arm26_forward_A.csv.
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,8 @@ import numpy as np
 
 from dms_core import Trajectory
 from dms_core.errors import InputError, choices
+from dms_core.input_file import decoded, read_bytes
+from dms_core.json_text import brief
 from dms_core.model import GROUND, Gravity, Input, JointAngle, JointReaction, MuscleSensor, Revolute, Steps, System
 from dms_core.model.sensors.muscle import Component
 from dms_core.model.signals import AnySignal
@@ -71,6 +74,10 @@ def bare_arm(
     )  # fmt: skip
 
 
+MOST_BYTES = 16 << 20
+"""Size up to which a table of excitations is read [byte]."""
+
+
 def read_excitations(path: str | Path) -> dict[str, Steps]:
     """A table of excitations: 'time_s' and one column a muscle; each row holds until the next.
 
@@ -78,12 +85,11 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
         InputError: names file, line and column of what is wrong.
     """
     path = Path(path)
+    text = decoded(path, read_bytes(path, MOST_BYTES))
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(f"excitations '{path}' cannot be read: {reason}.") from None
+        lines = list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as error:
+        raise InputError(f"excitations '{path}' cannot be read: {error}.") from None
     header = [name.strip() for name in lines[0]] if lines else []
     _check_header(path, header)
     rows = [
@@ -113,7 +119,7 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise InputError(f"excitations '{path}': the columns are separated by semicolons; separate them by commas.")
     for name in header:
         if name not in expected:
-            raise InputError(f"excitations '{path}': unknown column '{name}'. Expected {choices(expected)}.")
+            raise InputError(f"excitations '{path}': unknown column '{brief(name, 60)}'. Expected {choices(expected)}.")
         if header.count(name) > 1:
             raise InputError(f"excitations '{path}': the column '{name}' stands twice.")
     missing = expected - set(header)
@@ -133,11 +139,13 @@ def _has_cells(path: Path, line: int, cells: list[str], header: list[str]) -> bo
 def _number(path: Path, line: int, column: str, text: str) -> float:
     """A cell as a finite number, an excitation within 0 to 1."""
     try:
-        value = float(text)
+        # Python takes 1_0 for 10.
+        value = float("" if "_" in text else text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"excitations '{path}', line {line}, column '{column}': '{text}' is no finite number.")
+        said = brief(text, 60)
+        raise InputError(f"excitations '{path}', line {line}, column '{column}': '{said}' is no finite number.")
     if column != TIME and not 0.0 <= value <= 1.0:
         raise InputError(f"excitations '{path}', line {line}, column '{column}': {value:g} is not within 0 to 1.")
     return value

@@ -46,6 +46,11 @@ def legend(figure: Any, ax: Any, columns: int) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False, fontsize=8)
 
 
+def literal(text: str) -> str:
+    """A text for a figure as it stands: in that of a user, $ begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def save(figure: Any, path: Path) -> Path:
     """Write a picture as PNG, whole or not at all."""
     picture = io.BytesIO()

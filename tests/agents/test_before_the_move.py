@@ -15,6 +15,7 @@ from agents.environment import ENVIRONMENT
 from agents.evaluation.evaluate import evaluate
 from agents.policies.learned import find_policy
 from agents.training.config import Config
+from dms_core.errors import ModelWarning
 
 FILES = Path(__file__).with_name("before_the_move")
 ALGORITHMS = ("ppo", "sac", "tqc", "recurrent_ppo")
@@ -51,10 +52,11 @@ def test_trainings_go_on(algorithm, trainings):
 
 @pytest.mark.parametrize("name", ["policy", "policy_lstm"])
 def test_policies_act(name):
-    one = find_policy(str(FILES / name))
+    with pytest.warns(ModelWarning, match=f"{name}' is of format 1.* export .*{name} --out"):
+        one = find_policy(str(FILES / name))
     assert one.description.env_kwargs["patient"] == "stroke_mild"
     observation = np.random.default_rng(0).normal(size=12).astype(np.float32)
-    assert np.abs(one(observation, {})).max() <= 1.0
+    assert np.abs(one.network(observation)).max() <= 1.0
 
 
 def test_a_policy_from_a_training_and_a_population_file_are_evaluated(trainings, tmp_path):

@@ -128,7 +128,7 @@ def test_evaluations_with_other_loads_stay_apart(evaluated, tmp_path):
     "said, arguments",
     [
         ("is neither the folder of a training nor an evaluation", ["nowhere"]),
-        ("cannot be read", ["{folder}/evaluation.json"]),
+        ("is no JSON", ["{folder}/evaluation.json"]),
         ("expected folders of trainings or evaluation.json files", []),
         ("expected two different names", ["{evaluated}", "--policies", "pid"]),
         ("unknown population", ["{evaluated}", "--mild", "martians"]),

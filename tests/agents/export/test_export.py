@@ -264,10 +264,15 @@ def test_runs_are_read_without_opening_a_pickle(trained, tmp_path, monkeypatch):
     [
         ("weights.safetensors is cut off or was changed", lambda f: _cut(f / "weights.safetensors")),
         ("is no JSON", lambda f: _cut(f / "policy.json")),
-        ("cannot be read: weights.safetensors: No such file", lambda f: (f / "weights.safetensors").unlink()),
+        ("weights.safetensors' cannot be read: No such file", lambda f: (f / "weights.safetensors").unlink()),
         ("trained in exo/ElbowLift-v9", lambda f: _edit(f, environment="exo/ElbowLift-v9")),
         ("unknown key 'wings'", lambda f: _edit(f, wings=2)),
-        ("format = 2", lambda f: _edit(f, format=2)),
+        ("format = 3", lambda f: _edit(f, format=3)),
+        ("policy.json was changed", lambda f: _edit(f, action_mode="rope_tension")),
+        ("policy.json was changed", lambda f: _edit(f, env_kwargs={"repetitions": 7})),
+        ("policy.json was changed", lambda f: _edit(f, period=0.04)),
+        ("policy.json was changed", lambda f: _edit(f, steps=3)),
+        ("policy.json was changed", lambda f: _edit(f, sha256=None)),
         ("'title' is missing", lambda f: _edit(f, title=None)),
     ],
 )
