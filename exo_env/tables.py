@@ -52,9 +52,10 @@ class DriveTables(NamedTuple):
     steps: Kept
     """Largest change of each command in a control period, shape (n_c,)."""
     start: Kept
-    """What each command is at the start, and the most that it takes of the holding tension, shape (2, n_c)."""
+    """What each command is at the start, the most that it takes of the holding tension, and what it has for each radian
+    by which the arm begins beyond psi, shape (3, n_c)."""
     motors: Kept
-    """Coordinate of each motor that follows a command, and the command's number, shape (k, 2)."""
+    """Coordinate of each motor or filter that follows a command, and the command's number, shape (k, 2)."""
     rows: Kept
     """Row of each command in the signals of the world, shape (n_c,)."""
     axes: Kept
@@ -233,6 +234,8 @@ class RestTables(NamedTuple):
     """First coordinate of what moves, in the order of BODIES of rest_pose.py."""
     fibres: Kept
     """Coordinate of each muscle's fibre length, its activation behind it, shape (m,)."""
+    offset: Kept
+    """Coordinate that the controller adds to psi, shape (1,), or (0,) where it adds none."""
     rope: Kept
     """Place of the gym rope's length among the numbers of constraints, shape (1,)."""
     v: Kept

@@ -92,7 +92,8 @@ class ElbowLiftEnv(AssistanceEnv):
     number of the repetition and the noise of each channel comes from a random stream of its own, of the one number that
     a reset takes from the environment's generator. `reset(options={...})` fixes any of `patient`, `load` [kg],
     `reference` (numbers of a repetition: `start_deg` from 20 to 100, with `amplitude_deg` up to 100 in all) and
-    `initial_angle_deg` (0 to 142); all else is drawn as without it. `info` of a reset holds what was drawn, and
+    `initial_angle_deg` (0 to 142); all else is drawn as without it. Where that is not the reference's, the setpoint of
+    "pid_setpoint" begins at the arm and goes to the reference within 2 s. `info` of a reset holds what was drawn, and
     `ability`, the share of arm and load that the patient can hold (`exo_env/patient/ability.py`).
 
     ## Episode End
