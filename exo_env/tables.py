@@ -4,7 +4,7 @@ A world is one packed `WorldTables` w (dms_core/compiled/arena.py); kernels take
 
     readings = floats(inner(w, WORLD.task), TASK.readings)
 
-Each field says whether a reset keeps or clears its array (clearing.py).
+Each field says whether a reset keeps, fills or clears its array (clearing.py).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from dms_core.kernels import Packed, fields
-from exo_env.clearing import Cleared, Kept
+from exo_env.clearing import Cleared, Filled, Kept
 from exo_env.patient.effort import EffortState
 from exo_env.places import places
 
@@ -96,9 +96,9 @@ class PlanTables(NamedTuple):
     """Address of the movement's kernel, shape (1,)."""
     movement: Cleared
     """Numbers of the movement."""
-    starts: Kept
+    starts: Filled
     """Starts of the pieces of psi in the signals of the world [s]."""
-    coefficients: Kept
+    coefficients: Filled
     """Coefficients of these pieces, shape (n, 6)."""
     course: Cleared
     """psi, its rate and its acceleration at each control time, shape (k, 3)."""
@@ -161,13 +161,13 @@ class ObserverTables(NamedTuple):
 class DrawTables(NamedTuple):
     """The draw of the episode that a reset begins."""
 
-    key: Kept
+    key: Filled
     """Key of the random streams (streams.py), as a signed number, shape (1,)."""
-    patient: Kept
+    patient: Filled
     """Row of the patient."""
-    movement: Kept
+    movement: Filled
     """Numbers of the movement."""
-    given: Kept
+    given: Filled
     """Load, angle and phase of the start, at the places of GIVEN."""
 
 
@@ -175,20 +175,20 @@ class ScalingTables(NamedTuple):
     """Numbers of the world that follow from a patient's sizes; see scaling.py."""
 
     coefficients: Kept
-    """C for men, then for women, shape (2 n, monomials)."""
+    """C for men, then for women, as far as anybody was one, shape (2 n, monomials); shared by worlds."""
     constants: Kept
     """Time constants of activation and deactivation of a muscle [s], shape (2,)."""
-    numbers: Kept
+    numbers: Filled
     """C phi: the numbers of the model, then those that follow, which are views of it, shape (n,)."""
     targets: Kept
     """Where the model's numbers lie: a table as of arena.py, shape (k, 3)."""
-    start: Kept
+    start: Filled
     """Coordinates at the start; true only for what does not move, shape (n_q,)."""
-    muscles: Kept
-    points: Kept
-    elbow: Kept
+    muscles: Filled
+    points: Filled
+    elbow: Filled
     """Muscles, points of their paths, and centre of the elbow, as in an ArmTable."""
-    forearm: Kept
+    forearm: Filled
     """Inertia about the elbow, mass, centre of mass and grip, as in a LoadTable, shape (8,)."""
 
 
@@ -238,7 +238,7 @@ class RestTables(NamedTuple):
     """Coordinate that the controller adds to psi, shape (1,), or (0,) where it adds none."""
     rope: Kept
     """Place of the gym rope's length among the numbers of constraints, shape (1,)."""
-    v: Kept
+    v: Filled
     """Rates at the start, 0 but for the controller's."""
 
 
