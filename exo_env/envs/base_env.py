@@ -16,7 +16,6 @@ settings. One with a page and an id of its own is a subclass in a file of its ow
 
 from __future__ import annotations
 
-import copy
 import math
 import warnings
 from collections.abc import Mapping
@@ -46,6 +45,7 @@ from exo_env.envs.settings import (
     EnvSettings,
     checked_settings,
     load_distribution,
+    owned,
     whole_periods,
     worn_device,
     worn_misalignment,
@@ -84,7 +84,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
 
     def __init__(self, **settings: Any) -> None:
         # What a caller does to a mapping afterwards must not reach into the environment.
-        self.settings = s = checked_settings(self.settings_type, plain(copy.deepcopy(settings)))
+        self.settings = s = checked_settings(self.settings_type, owned(settings))
         if s.render_mode is not None:
             from exo_env.rendering.canvas import import_pygame
 
@@ -224,7 +224,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
         Raises:
             InputError: an option is unknown or not usable.
         """
-        self._sources = self._draws.changed(self._draws.sources, copy.deepcopy(options))
+        self._sources = self._draws.changed(self._draws.sources, options)
 
     def begun(self, code: int) -> None:
         """Last part of a reset.

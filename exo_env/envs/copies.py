@@ -22,8 +22,13 @@ TRANSIENT = ("_episode", "_readout", "_renderer", "world")
 
 
 class WithSpec:
-    """What Gymnasium says of how an environment was made, with files by their whole paths."""
+    """What Gymnasium says of how an environment was made, with files by their whole paths.
 
+    Its `max_episode_steps`, which wrappers and libraries look up, is the number of control periods after which time
+    ends an episode. Who makes another environment of the spec with a longer episode gives `max_episode_steps=-1`.
+    """
+
+    steps: int
     _spec: EnvSpec | None = None
 
     @property
@@ -36,6 +41,7 @@ class WithSpec:
         if spec is not None:
             spec = copy.deepcopy(spec)
             spec.kwargs = {name: _whole(value) for name, value in spec.kwargs.items()}
+            spec.max_episode_steps = self.steps
         self._spec = spec
 
 

@@ -100,7 +100,8 @@ class ElbowLiftEnv(AssistanceEnv):
     Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
     elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
     `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), or as long for each of
-    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`.
+    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`, and the spec of
+    an environment says its own.
 
     ## Arguments
     All by keyword, all JSON.

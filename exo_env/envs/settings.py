@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -58,6 +59,22 @@ class EnvSettings(Settings):
     cycle: Any = Field(default=None, description="number of different episodes, after which the first comes again")
     rtol: Any = Field(default=None, description="relative tolerance of the solver; None: that of the drive")
     render_mode: Literal["human", "rgb_array"] | None = None
+
+
+def owned(value: Any) -> Any:
+    """A copy of what a user gives, with dicts, lists and Python's numbers in place of others' mappings and numbers.
+
+    What the user does to it afterwards reaches nobody else.
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {name: owned(x) for name, x in value.items()}
+    if type(value) is tuple:
+        return tuple(owned(x) for x in value)
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [owned(x) for x in value]
+    return copy.deepcopy(value)
 
 
 def within(value: Any, low: float, high: float) -> bool:
