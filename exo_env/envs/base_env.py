@@ -259,6 +259,11 @@ class AssistanceEnv(Copied, gymnasium.Env):
         return self.world.packed
 
     @property
+    def under_way(self) -> bool:
+        """Whether there is an episode, be it over or not."""
+        return self._episode is not None or self._held is not None
+
+    @property
     def episode(self) -> Episode:
         """The present episode.
 
@@ -266,7 +271,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
             gymnasium.error.ResetNeeded: `reset` was not called.
         """
         if self._held is not None:
-            _ = self.world
+            _ = self.world  # takes it up
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("The environment has no episode; call reset() first.")
         return self._episode

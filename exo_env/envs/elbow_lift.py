@@ -128,8 +128,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | `repetitions`      | `1`              | one begins every `episode_duration / repetitions`, or after the last one |
 
     `readings()` gives every sensor of the model without noise. `summary()` is a table of terms,
-    channels and actions, as text. A copied or pickled environment is the same environment without an episode: it begins
-    with `reset`. Axes of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
+    channels and actions, as text. A copied or pickled environment is the same environment, amid the same episode. Axes
+    of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
 
     ## Version History
     * v1: every number of an episode has a random stream of its own, so that other patients are drawn; physics, rewards

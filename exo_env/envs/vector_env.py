@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
 from operator import attrgetter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import gymnasium
 import numpy as np
@@ -61,7 +62,7 @@ class AssistanceVectorEnv(WithSpec, VectorEnv):
     Args:
         num_envs: number of worlds.
         autoreset_mode: a gymnasium.vector.AutoresetMode: a new episode begins at the step after the last one's end
-            (default), at the same step, or at a call of `reset` only.
+            (default), at the same step, or at a call of `reset` only, which is the way for torchrl.
         threads: number of threads that step the worlds; None takes one for each core.
         max_episode_steps: control periods after which time ends an episode, as `gymnasium.make_vec` gives them; None
             and -1: those of the environment's `episode_duration`.
@@ -107,11 +108,14 @@ class AssistanceVectorEnv(WithSpec, VectorEnv):
         self.observation_space = batch_space(one.observation_space, self.num_envs)
         self.action_space = batch_space(one.action_space, self.num_envs)
         self._task: Task = one.task
-        places = np.array([place for _, place, _ in one.task.reported_places], np.int64)
-        self._batch = Batch(num_envs, one.observer.size, len(one.task.terms), places, threads)
+        self._batch = self._made_batch(threads)
         self._over = np.ones(num_envs, bool)
         self._episodes: list[Episode | None] = [None] * num_envs
         self._started = False
+
+    def _made_batch(self, threads: int | None) -> Batch:
+        places = np.array([place for _, place, _ in self._task.reported_places], np.int64)
+        return Batch(self.num_envs, self.envs[0].observer.size, len(self._task.terms), places, threads)
 
     @property
     def observation_structure(self) -> tuple:
@@ -310,9 +314,24 @@ class AssistanceVectorEnv(WithSpec, VectorEnv):
         """A picture of each world."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
+    def __copy__(self) -> Self:
+        """A copy with worlds and generators of its own."""
+        return copy.deepcopy(self)
+
+    @one_at_a_time
     def __getstate__(self) -> dict[str, Any]:
-        """Refuse copies: the worlds are addresses of this process."""
-        raise TypeError(f"{type(self).__name__} cannot be copied or pickled; make another one of the same settings.")
+        """All attributes but those of one process, which a copy makes anew; the episodes go along with their worlds."""
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("_batch", "_episodes", "_turn")}
+        return kept | {"_threads": self._batch.threads}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        threads = state.pop("_threads")
+        self.__dict__.update(state, _turn=threading.Lock(), _episodes=[None] * state["num_envs"])
+        self._batch = self._made_batch(threads)
+        for i, env in enumerate(self.envs):
+            if env.under_way:
+                self._episodes[i] = env.episode
+                self._take_over(i)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]

@@ -103,6 +103,35 @@ def test_a_world_of_a_batch_can_be_copied():
     worlds.close()
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("way", list(WAYS))
+def test_a_batch_is_copied_as_a_whole(way, mode):
+    worlds = ElbowLiftVectorEnv(3, episode_duration=0.3, autoreset_mode=mode, threads=2, **ALL)
+    worlds.action_space.seed(3)
+    fresh = WAYS[way](worlds)
+    np.testing.assert_array_equal(worlds.reset(seed=0)[0], fresh.reset(seed=0)[0])
+    worlds.reset(seed=4)
+    actions = np.random.default_rng(0).uniform(-1.0, 0.0, (50, 3, 2))
+    worlds.envs[2].note = "kept"
+    for action in actions[:11]:
+        worlds.step(action)
+    # The second world has begun another episode, a step behind the others.
+    worlds.reset(options={"reset_mask": np.array([False, True, False])})
+    twin = WAYS[way](worlds)
+    assert twin.envs[2].note == "kept"
+    for action in actions[11:]:
+        ours, theirs = worlds.step(action), twin.step(action)
+        for one, other in zip(ours[:4], theirs[:4], strict=True):
+            np.testing.assert_array_equal(one, other)
+        assert repr(ours[4]) == repr(theirs[4])
+    np.testing.assert_array_equal(worlds.action_space.sample(), twin.action_space.sample())
+    np.testing.assert_array_equal(worlds.reset()[0], twin.reset()[0])
+    worlds.close()
+    # What one closes is the other's no more.
+    twin.step(actions[0])
+    twin.close()
+
+
 def test_nothing_that_is_kept_changes_in_an_episode():
     """A copy takes over what a reset fills and clears; any other array must be the same in all episodes."""
     env = ElbowLiftEnv(**ALL)
