@@ -8,6 +8,7 @@ zero at each reset before anything is put into it. The last two are what an epis
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
@@ -36,7 +37,7 @@ def arrays_of(values: Any, *kinds: Any) -> Iterator[tuple[str, np.ndarray]]:
     Raises:
         TypeError: a field is of no kind, or a cleared array has other numbers than of 8 bytes.
     """
-    hints = get_type_hints(type(values), include_extras=True)
+    hints = _kinds(type(values))
     for name, value in zip(values._fields, values, strict=True):
         where = f"{type(values).__name__}.{name}"
         if isinstance(value, Packed):
@@ -50,6 +51,12 @@ def arrays_of(values: Any, *kinds: Any) -> Iterator[tuple[str, np.ndarray]]:
             raise TypeError(f"{where}: expected numbers of 8 bytes, got {value.dtype}.")
         if hints[name] in kinds:
             yield where, value
+
+
+@cache
+def _kinds(tables: type) -> dict[str, Any]:
+    """What each field of a NamedTuple class declares."""
+    return get_type_hints(tables, include_extras=True)
 
 
 @compiled

@@ -113,8 +113,6 @@ class AssistanceEnv(Copied, gymnasium.Env):
         )
         self._sources = self._draws.sources
         self._keys = Keys(s.cycle)
-        self._episode = None
-        self._held = None
         self._readout: Readout | None = None
         self._over = False
         self._renderer: Any = None

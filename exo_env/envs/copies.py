@@ -54,8 +54,9 @@ def _whole(value: Any) -> Any:
 class Copied(WithSpec):
     """An environment whose copies and pickles are the same environment, with generators of their own."""
 
-    _episode: Episode | None
-    _held: HeldEpisode | None
+    _episode: Episode | None = None
+    _held: HeldEpisode | None = None
+    """Episode of the environment that was copied, until the copy takes it up."""
 
     @cached_property
     def world(self) -> PatientWorld:
@@ -76,5 +77,5 @@ class Copied(WithSpec):
         return kept
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in {"_episode": None, "_readout": None, "_renderer": None, **state}.items():
+        for name, value in {"_readout": None, "_renderer": None, **state}.items():
             setattr(self, name, value)

@@ -6,11 +6,13 @@ snapshot of its state (dms_core). What goes on from it gives the same bits.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 
+from dms_core.errors import InputError
 from dms_core.simulation.snapshot import Snapshot
 from exo_env.clearing import Cleared, Filled, arrays_of
 from exo_env.patient.ability import Need
@@ -47,12 +49,24 @@ def hold(world: PatientWorld, episode: Episode) -> HeldEpisode:
 
 
 def take_up(world: PatientWorld, held: HeldEpisode) -> Episode:
-    """Go on with an episode in a new world of the same environment."""
-    for into, content in zip(world.model.numbers, held.numbers, strict=True):
-        into[...] = np.frombuffer(content, into.dtype).reshape(into.shape)
+    """Go on with an episode in a new world of the same environment.
+
+    Raises:
+        InputError: it was held by another version of this package, whose worlds have other arrays.
+    """
+    _put_back(world.model.numbers, held.numbers)
     own = world.dynamics.snapshot().orders
     world.dynamics.restore(replace(held.past, orders=held.past.orders or own))
     world.follow_dynamics()
-    for into, content in zip(_episode_arrays(world), held.arrays, strict=True):
-        into[...] = np.frombuffer(content, into.dtype).reshape(into.shape)
+    _put_back(_episode_arrays(world), held.arrays)
     return Episode(world, held.draw, held.need)
+
+
+def _put_back(arrays: Sequence[np.ndarray], contents: Sequence[bytes]) -> None:
+    if [x.nbytes for x in arrays] != [len(content) for content in contents]:
+        raise InputError(
+            "The episode of this copy was begun by another version of exo_env, and cannot go on here; expected a "
+            "reset() first."
+        )
+    for into, content in zip(arrays, contents, strict=True):
+        into[...] = np.frombuffer(content, into.dtype).reshape(into.shape)

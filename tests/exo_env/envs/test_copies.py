@@ -5,6 +5,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cloudpickle
@@ -14,6 +15,7 @@ import pytest
 from gymnasium.wrappers import RecordEpisodeStatistics
 
 from dms_core.config_files import configs
+from dms_core.errors import InputError
 from exo_env.clearing import Kept, arrays_of
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 
@@ -281,6 +283,18 @@ def test_a_spec_names_files_by_their_whole_paths(files, tmp_path, monkeypatch, v
     np.testing.assert_array_equal(again.reset(seed=2)[0], first.reset(seed=2)[0])
     again.close()
     first.close()
+
+
+def test_an_episode_of_another_version_needs_a_reset():
+    env = ElbowLiftEnv()
+    env.reset(seed=0)
+    state = env.__getstate__()
+    state["_held"] = replace(state["_held"], arrays=state["_held"].arrays[1:])
+    twin = ElbowLiftEnv.__new__(ElbowLiftEnv)
+    twin.__setstate__(state)
+    with pytest.raises(InputError, match=r"another version of exo_env.* expected a reset\(\) first"):
+        twin.step(HOLD)
+    np.testing.assert_array_equal(twin.reset()[0], env.reset()[0])
 
 
 def test_what_cannot_be_copied_says_so():
