@@ -288,7 +288,7 @@ def test_a_spec_names_files_by_their_whole_paths(files, tmp_path, monkeypatch, v
 def test_an_episode_of_another_version_needs_a_reset():
     env = ElbowLiftEnv()
     env.reset(seed=0)
-    state = env.__getstate__()
+    state = copy.deepcopy(env.__getstate__())
     state["_held"] = replace(state["_held"], arrays=state["_held"].arrays[1:])
     twin = ElbowLiftEnv.__new__(ElbowLiftEnv)
     twin.__setstate__(state)
