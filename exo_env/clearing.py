@@ -37,9 +37,10 @@ def arrays_of(values: Any, *kinds: Any) -> Iterator[tuple[str, np.ndarray]]:
     Raises:
         TypeError: a field is of no kind, or a cleared array has other numbers than of 8 bytes.
     """
-    hints = _kinds(type(values))
+    kind: Any = type(values)
+    hints = _kinds(kind)
     for name, value in zip(values._fields, values, strict=True):
-        where = f"{type(values).__name__}.{name}"
+        where = f"{kind.__name__}.{name}"
         if isinstance(value, Packed):
             continue
         if isinstance(value, tuple):
