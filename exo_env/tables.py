@@ -4,7 +4,7 @@ A world is one packed `WorldTables` w (dms_core/compiled/arena.py); kernels take
 
     readings = floats(inner(w, WORLD.task), TASK.readings)
 
-Each field says whether a reset keeps or clears its array (clearing.py).
+Each field says whether a reset keeps, fills or clears its array (clearing.py).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from dms_core.kernels import Packed, fields
-from exo_env.clearing import Cleared, Kept
+from exo_env.clearing import Cleared, Filled, Kept
 from exo_env.patient.effort import EffortState
 from exo_env.places import places
 
@@ -52,9 +52,10 @@ class DriveTables(NamedTuple):
     steps: Kept
     """Largest change of each command in a control period, shape (n_c,)."""
     start: Kept
-    """What each command is at the start, and the most that it takes of the holding tension, shape (2, n_c)."""
+    """What each command is at the start, the most that it takes of the holding tension, and what it has for each radian
+    by which the arm begins beyond psi, shape (3, n_c)."""
     motors: Kept
-    """Coordinate of each motor that follows a command, and the command's number, shape (k, 2)."""
+    """Coordinate of each motor or filter that follows a command, and the command's number, shape (k, 2)."""
     rows: Kept
     """Row of each command in the signals of the world, shape (n_c,)."""
     axes: Kept
@@ -95,9 +96,9 @@ class PlanTables(NamedTuple):
     """Address of the movement's kernel, shape (1,)."""
     movement: Cleared
     """Numbers of the movement."""
-    starts: Kept
+    starts: Filled
     """Starts of the pieces of psi in the signals of the world [s]."""
-    coefficients: Kept
+    coefficients: Filled
     """Coefficients of these pieces, shape (n, 6)."""
     course: Cleared
     """psi, its rate and its acceleration at each control time, shape (k, 3)."""
@@ -160,13 +161,13 @@ class ObserverTables(NamedTuple):
 class DrawTables(NamedTuple):
     """The draw of the episode that a reset begins."""
 
-    key: Kept
+    key: Filled
     """Key of the random streams (streams.py), as a signed number, shape (1,)."""
-    patient: Kept
+    patient: Filled
     """Row of the patient."""
-    movement: Kept
+    movement: Filled
     """Numbers of the movement."""
-    given: Kept
+    given: Filled
     """Load, angle and phase of the start, at the places of GIVEN."""
 
 
@@ -174,20 +175,20 @@ class ScalingTables(NamedTuple):
     """Numbers of the world that follow from a patient's sizes; see scaling.py."""
 
     coefficients: Kept
-    """C for men, then for women, shape (2 n, monomials)."""
+    """C for men, then for women, as far as anybody was one, shape (2 n, monomials); shared by worlds."""
     constants: Kept
     """Time constants of activation and deactivation of a muscle [s], shape (2,)."""
-    numbers: Kept
+    numbers: Filled
     """C phi: the numbers of the model, then those that follow, which are views of it, shape (n,)."""
     targets: Kept
     """Where the model's numbers lie: a table as of arena.py, shape (k, 3)."""
-    start: Kept
+    start: Filled
     """Coordinates at the start; true only for what does not move, shape (n_q,)."""
-    muscles: Kept
-    points: Kept
-    elbow: Kept
+    muscles: Filled
+    points: Filled
+    elbow: Filled
     """Muscles, points of their paths, and centre of the elbow, as in an ArmTable."""
-    forearm: Kept
+    forearm: Filled
     """Inertia about the elbow, mass, centre of mass and grip, as in a LoadTable, shape (8,)."""
 
 
@@ -233,9 +234,11 @@ class RestTables(NamedTuple):
     """First coordinate of what moves, in the order of BODIES of rest_pose.py."""
     fibres: Kept
     """Coordinate of each muscle's fibre length, its activation behind it, shape (m,)."""
+    offset: Kept
+    """Coordinate that the controller adds to psi, shape (1,), or (0,) where it adds none."""
     rope: Kept
     """Place of the gym rope's length among the numbers of constraints, shape (1,)."""
-    v: Kept
+    v: Filled
     """Rates at the start, 0 but for the controller's."""
 
 

@@ -54,6 +54,13 @@ class Packed:
             else:
                 self.table[k] = (0, int(value), 1)
 
+    def __reduce__(self) -> Any:
+        """Refuse copies and pickles, which would hold addresses of other arrays."""
+        raise TypeError(
+            "A packed table cannot be copied or pickled, since it holds addresses of this process; expected a Snapshot "
+            "of a World, or a copy of an environment as a whole."
+        )
+
 
 def _pointer_to(element: Any) -> Any:
     @intrinsic

@@ -31,13 +31,15 @@ GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v"
 
 
 class Orders(NamedTuple):
-    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders of elimination."""
+    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders, nominal sizes."""
 
     active: np.ndarray
     newton: NewtonPattern
     newton_lu: LuTables
     rates: RatePattern
     rate_lu: LuTables
+    scale_q: np.ndarray
+    scale_v: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def _structure(model: Model, signals: Signals) -> str:
 
 def take(model: Model, tables: Tables, state: State, options: SolverOptions, result: Result) -> Snapshot:
     """The world as it is now."""
-    orders = Orders(tables.active, tables.newton, tables.newton_lu, tables.rates, tables.rate_lu)
+    orders = Orders(*(getattr(tables, name) for name in Orders._fields))
     return Snapshot(
         model.system.name, float(state.clock[CLOCK.t]), options, result, _structure(model, state.signals),
         _digest(*model.numbers), tuple(x.tobytes() for x in held_arrays(state)), orders,

@@ -46,6 +46,8 @@ def _check_command(who: str, command: Command) -> None:
         raise InputError(f"{who}: rate = {command.rate}; expected a number above 0, math.inf for no limit.")
     if not math.isfinite(command.start):
         raise InputError(f"{who}: start = {command.start}; expected a finite number.")
+    if not math.isfinite(command.apart):
+        raise InputError(f"{who}: apart = {command.apart}; expected a finite number.")
     if not command.holds >= 0.0:
         raise InputError(f"{who}: holds = {command.holds}; expected a tension from 0 N.")
 

@@ -9,6 +9,10 @@ compiled kernel that says what each command is to be at the end of the coming co
 
 A command goes linearly from its last value to the new one over the period, as far as its largest rate takes it, so that
 rates hold at all times and nothing jumps inside the solver.
+
+An episode may begin with the arm apart from the reference psi. A controller of psi would pull the arm there at once; a
+command that shifts its setpoint therefore begins with what the arm is apart (`Command.apart`), and the kernel adds
+what `still_apart(w)` leaves of it.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dms_core.errors import InputError
-from dms_core.kernels import floats, inner, matrix
+from dms_core.kernels import floats, inner, ints, matrix
 from dms_core.model import Constant, Input
 from dms_core.model.element import Force
 from dms_core.validation import plain
@@ -27,7 +31,10 @@ from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.jit import compiled
 from exo_env.settings import Settings
-from exo_env.tables import DRIVE, WORLD
+from exo_env.tables import DRAW, DRIVE, GIVEN, PLAN, STATUS, WORLD
+
+RETURN = 2.0
+"""Time in which a setpoint goes from where the arm begins to psi [s]; assumed: that of a slow move of the exercise."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +49,10 @@ class Command:
     """Value at the start of an episode."""
     holds: float = 0.0
     """Most that it takes, at the start, of the tension that holds the arm [N]."""
+    apart: float = 0.0
+    """What it has at the start beside that, for each radian by which the arm begins beyond psi."""
     motor: str | None = None
-    """Motor whose tension is this command where the world rests."""
+    """Motor or filter whose tension or setpoint is this command where the world rests."""
 
 
 class Drive(Settings):
@@ -75,12 +84,12 @@ class Drive(Settings):
         return [Input(name=n, signal=Constant(value=float(x))) for n, x in zip(names, start, strict=True)]
 
     def start_table(self, device: Exoskeleton) -> np.ndarray:
-        """Start of each command, and the most that it takes of the holding tension, shape (2, n)."""
-        return np.array([[c.start, c.holds] for c in self.commands(device)]).T.copy()
+        """Start of each command, the most that it takes of the holding tension, and `apart`, shape (3, n)."""
+        return np.array([[c.start, c.holds, c.apart] for c in self.commands(device)]).T.copy()
 
     def start(self, device: Exoskeleton, holding_tension: float) -> np.ndarray:
-        """Each command at the start, where a tension [N] of the lifting rope would hold the arm."""
-        always, most = self.start_table(device)
+        """Each command at the start on psi, where a tension [N] of the lifting rope would hold the arm."""
+        always, most, _ = self.start_table(device)
         return always + np.clip(holding_tension, 0.0, most)
 
 
@@ -91,6 +100,19 @@ def affine(w):
     action, wanted, x = floats(drive, DRIVE.action), floats(drive, DRIVE.wanted), matrix(drive, DRIVE.numbers)
     for i in range(wanted.shape[0]):
         wanted[i] = x[i, 0] + x[i, 1] * action[i]
+
+
+@compiled
+def start_apart(w):
+    """Angle by which the arm begins beyond psi [rad]."""
+    return floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start] - matrix(inner(w, WORLD.plan), PLAN.course)[0, 0]
+
+
+@compiled
+def still_apart(w):
+    """What is left of `start_apart` at the end of the coming period [rad]: a minimum-jerk curve, 0 from RETURN on."""
+    s = min((ints(w, WORLD.status)[STATUS.step] + 1) * floats(w, WORLD.period)[0] / RETURN, 1.0)
+    return start_apart(w) * (1.0 - s * s * s * (10.0 + s * (6.0 * s - 15.0)))
 
 
 def checked_action(action: object, size: int) -> np.ndarray:

@@ -16,12 +16,11 @@ settings. One with a page and an id of its own is a subclass in a file of its ow
 
 from __future__ import annotations
 
-import copy
 import math
 import warnings
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -39,13 +38,15 @@ from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.subject import read_subject
+from exo_env.envs.copies import Copied
 from exo_env.envs.draw import EpisodeDraws, Keys
 from exo_env.envs.settings import (
     SOLVER_OPTIONS,
     EnvSettings,
     checked_settings,
-    control_steps,
     load_distribution,
+    owned,
+    whole_periods,
     worn_device,
     worn_misalignment,
 )
@@ -58,14 +59,12 @@ from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import NOTHING, Task
 from exo_env.world.control_period import finish, run_period
 from exo_env.world.episode import Episode
+from exo_env.world.held_episode import take_up
 from exo_env.world.readout import Readout
 from exo_env.world.world import PatientWorld
 
-TRANSIENT = ("_episode", "_readout", "_renderer", "world")
-"""Attributes that a copy of an environment does without: they belong to one process and one episode."""
 
-
-class AssistanceEnv(gymnasium.Env):
+class AssistanceEnv(Copied, gymnasium.Env):
     """One arm with a worn device, as an environment. See the page of a subclass, such as `ElbowLiftEnv`.
 
     Args:
@@ -85,15 +84,15 @@ class AssistanceEnv(gymnasium.Env):
 
     def __init__(self, **settings: Any) -> None:
         # What a caller does to a mapping afterwards must not reach into the environment.
-        self.settings = s = checked_settings(self.settings_type, plain(copy.deepcopy(settings)))
+        self.settings = s = checked_settings(self.settings_type, owned(settings))
         if s.render_mode is not None:
             from exo_env.rendering.canvas import import_pygame
 
             import_pygame()
         self.render_mode, self.period = s.render_mode, 1.0 / s.control_rate
         self.metadata = {**type(self).metadata, "render_fps": round(s.control_rate)}
-        self.duration = float(s.episode_duration or self.usual_duration(s))
-        self.steps = control_steps(self.duration, s.control_rate)
+        wanted = float(s.episode_duration or self.usual_duration(s))
+        self.steps, self.duration = whole_periods(wanted, s.control_rate)
         self.ecosystem = self.made_ecosystem(s)
         self.action_mode, self.drive = s.action_mode, self._made_drive(s)
         check_drive(self.drive, self.ecosystem.device)
@@ -114,7 +113,6 @@ class AssistanceEnv(gymnasium.Env):
         )
         self._sources = self._draws.sources
         self._keys = Keys(s.cycle)
-        self._episode: Episode | None = None
         self._readout: Readout | None = None
         self._over = False
         self._renderer: Any = None
@@ -212,7 +210,7 @@ class AssistanceEnv(gymnasium.Env):
             InputError: an option is unknown or not usable.
         """
         super().reset(seed=plain(seed))
-        self._over, self._episode = True, None
+        self._over, self._episode, self._held = True, None, None
         if seed is not None:
             self._keys.restart()
         sources = self._draws.changed(self._sources, options)
@@ -224,7 +222,7 @@ class AssistanceEnv(gymnasium.Env):
         Raises:
             InputError: an option is unknown or not usable.
         """
-        self._sources = self._draws.changed(self._draws.sources, copy.deepcopy(options))
+        self._sources = self._draws.changed(self._draws.sources, options)
 
     def begun(self, code: int) -> None:
         """Last part of a reset.
@@ -243,16 +241,25 @@ class AssistanceEnv(gymnasium.Env):
 
     @cached_property
     def world(self) -> PatientWorld:
-        """The world in which all episodes take place."""
-        return PatientWorld(
+        """The world in which all episodes take place; that of a copy goes on with the episode that was copied."""
+        world = PatientWorld(
             self.ecosystem, self.drive, self.task, self.movement, self.observer, period=self.period,
             duration=self.duration, steps=self.steps, options=self.solver,
         )  # fmt: skip
+        if self._held is not None:
+            self._episode, self._held = take_up(world, self._held), None
+            self._readout = Readout(world, self._episode)
+        return world
 
     @property
     def packed(self) -> Packed:
         """The packed `WorldTables` of the world, for a batch."""
         return self.world.packed
+
+    @property
+    def under_way(self) -> bool:
+        """Whether there is an episode, be it over or not."""
+        return self._episode is not None or self._held is not None
 
     @property
     def episode(self) -> Episode:
@@ -261,10 +268,10 @@ class AssistanceEnv(gymnasium.Env):
         Raises:
             gymnasium.error.ResetNeeded: `reset` was not called.
         """
+        if self._held is not None:
+            _ = self.world  # takes it up
         if self._episode is None:
-            raise gymnasium.error.ResetNeeded(
-                "The environment has no episode; call reset() first. A copy begins without one."
-            )
+            raise gymnasium.error.ResetNeeded("The environment has no episode; call reset() first.")
         return self._episode
 
     @property
@@ -289,7 +296,9 @@ class AssistanceEnv(gymnasium.Env):
             gymnasium.error.ResetNeeded: there is no episode, or it is over.
         """
         used, _ = checked_action(action, self.actions), self.episode
-        if self._over:
+        status = self.world.tables.status.tolist()
+        # A batch that moves the world keeps its own account of what is over.
+        if self._over or status[STATUS.step] >= self.steps or status[STATUS.event] != NOTHING:
             raise gymnasium.error.ResetNeeded("The episode is over; call reset() before the next step().")
         # Until the period is done to its end: what breaks it off leaves nothing to step.
         self._over = True
@@ -384,14 +393,3 @@ class AssistanceEnv(gymnasium.Env):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
-
-    def __copy__(self) -> Self:
-        """A copy with a generator of its own: sharing one would let each copy change what the other draws."""
-        return copy.deepcopy(self)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the episode and its compiled world: a copy is the same environment, and must be reset."""
-        return {name: value for name, value in self.__dict__.items() if name not in TRANSIENT}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, _episode=None, _readout=None, _renderer=None, _over=False)

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError, choices
-from dms_core.validation import plain
-from exo_env.envs.settings import load_distribution, within
+from exo_env.envs.settings import load_distribution, owned, within
 from exo_env.patient.distributions import Distribution, Draws
 from exo_env.patient.population import Population, population
 from exo_env.streams import stream, uniform
@@ -121,7 +120,7 @@ class EpisodeDraws:
         """
         made: dict[str, Any] = {}
         for name, given in checked_options(options).items():
-            value = plain(given)
+            value = owned(given)
             if name == "patient":
                 made["patients"] = population(value)
             elif name == "load":

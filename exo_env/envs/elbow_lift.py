@@ -92,14 +92,16 @@ class ElbowLiftEnv(AssistanceEnv):
     number of the repetition and the noise of each channel comes from a random stream of its own, of the one number that
     a reset takes from the environment's generator. `reset(options={...})` fixes any of `patient`, `load` [kg],
     `reference` (numbers of a repetition: `start_deg` from 20 to 100, with `amplitude_deg` up to 100 in all) and
-    `initial_angle_deg` (0 to 142); all else is drawn as without it. `info` of a reset holds what was drawn, and
+    `initial_angle_deg` (0 to 142); all else is drawn as without it. Where that is not the reference's, the setpoint of
+    "pid_setpoint" begins at the arm and goes to the reference within 2 s. `info` of a reset holds what was drawn, and
     `ability`, the share of arm and load that the patient can hold (`exo_env/patient/ability.py`).
 
     ## Episode End
     Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
     elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
     `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), or as long for each of
-    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`.
+    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`, and the spec of
+    an environment says its own.
 
     ## Arguments
     All by keyword, all JSON.
@@ -126,8 +128,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | `repetitions`      | `1`              | one begins every `episode_duration / repetitions`, or after the last one |
 
     `readings()` gives every sensor of the model without noise. `summary()` is a table of terms,
-    channels and actions, as text. A copied or pickled environment is the same environment without an episode: it begins
-    with `reset`. Axes of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
+    channels and actions, as text. A copied or pickled environment is the same environment, amid the same episode. Axes
+    of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
 
     ## Version History
     * v1: every number of an episode has a random stream of its own, so that other patients are drawn; physics, rewards

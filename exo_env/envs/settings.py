@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +27,14 @@ the largest error of a step; with a twentieth, the default elsewhere, the elbow 
 rtol 1e-6, in a third to a half more iterations."""
 DEFAULT_LOAD = {"uniform": [0.5, 2.0]}
 """Weight on the machine [kg]; assumed."""
+SLOWEST, FASTEST = 5.0, 1000.0
+"""Control rates [Hz]."""
+SHORTEST, LONGEST = 0.1, 120.0
+"""Durations of an episode that a user may give [s]."""
+MOST_PERIODS = 120_000
+"""Largest number of control periods in an episode, of which each takes some 200 bytes."""
+SAME = 1e-6
+"""Part of a number of periods up to which it counts as whole: rounding of what was given in single precision."""
 MOST_CYCLE = 100_000
 """Largest number of different episodes that an environment remembers."""
 
@@ -49,6 +59,22 @@ class EnvSettings(Settings):
     cycle: Any = Field(default=None, description="number of different episodes, after which the first comes again")
     rtol: Any = Field(default=None, description="relative tolerance of the solver; None: that of the drive")
     render_mode: Literal["human", "rgb_array"] | None = None
+
+
+def owned(value: Any) -> Any:
+    """A copy of what a user gives, with dicts, lists and Python's numbers in place of others' mappings and numbers.
+
+    What the user does to it afterwards reaches nobody else.
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {name: owned(x) for name, x in value.items()}
+    if type(value) is tuple:
+        return tuple(owned(x) for x in value)
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [owned(x) for x in value]
+    return copy.deepcopy(value)
 
 
 def within(value: Any, low: float, high: float) -> bool:
@@ -94,9 +120,9 @@ def checked_settings(kind: type[EnvSettings], settings: Mapping[str, Any]) -> En
         if name not in kind.model_fields:
             raise InputError(f"setting '{name}' is unknown; there are {choices(kind.model_fields)}.")
     s = kind(**settings)
-    check_number("control_rate", s.control_rate, 5.0, 1000.0, "Hz")
+    check_number("control_rate", s.control_rate, SLOWEST, FASTEST, "Hz")
     if s.episode_duration is not None:
-        check_number("episode_duration", s.episode_duration, 0.1, 120.0, "s")
+        check_number("episode_duration", s.episode_duration, SHORTEST, LONGEST, "s")
     if s.rtol is not None:
         check_number("rtol", s.rtol, 1e-8, 0.2)
     if s.cycle is not None:
@@ -104,19 +130,33 @@ def checked_settings(kind: type[EnvSettings], settings: Mapping[str, Any]) -> En
     return s
 
 
-def control_steps(duration: float, rate: float) -> int:
-    """Number of control periods in an episode.
+def whole_periods(duration: float, rate: float) -> tuple[int, float]:
+    """Number of control periods in an episode, and its true length [s].
+
+    A length that is no whole number of periods becomes the nearest one that is, with a warning that says so.
 
     Raises:
-        InputError: the episode is shorter than one.
+        InputError: the episode is shorter than one period, or longer than MOST_PERIODS of them.
     """
-    steps = round(duration * rate)
-    if steps < 1:
+    what = f"an episode of {duration:g} s at control_rate = {rate:g} Hz"
+    if not duration * rate <= MOST_PERIODS * (1.0 + SAME):
+        raise InputError(f"{what}: expected at most {MOST_PERIODS:,} control periods, {MOST_PERIODS / rate:g} s.")
+    if not duration * rate >= 1.0 - SAME:
+        # Rounded up, so that what is named is allowed.
         raise InputError(
-            f"episode_duration = {duration:g} s at control_rate = {rate:g} Hz is less than one control period; "
-            f"expected at least {1.0 / rate:g} s."
+            f"{what} is less than one control period: expected an episode_duration of at least "
+            f"{max(math.ceil(1e6 / rate) / 1e6, SHORTEST):g} s, or a control_rate of at least {1.0 / duration:g} Hz."
+            if duration > 0.0
+            else f"{what}: expected a duration above 0."
         )
-    return steps
+    steps = max(round(duration * rate), 1)
+    if abs(duration * rate - steps) <= SAME * steps:
+        return steps, duration
+    warnings.warn(
+        f"{what} would be {duration * rate:.6g} control periods: it takes {steps}, which are {steps / rate:.6g} s.",
+        stacklevel=3,
+    )
+    return steps, steps / rate
 
 
 def load_distribution(load: float | Mapping[str, Any] | None) -> Distribution:

@@ -84,14 +84,9 @@ class AssistanceVecEnv(VecEnv):
         Raises:
             InputError: it is a setting, from which the environment was made; says what to do instead.
         """
-        envs = [self.worlds.envs[i] for i in self._get_indices(indices)]
-        if attr_name in (*self.worlds.env_type.settings_type.model_fields, *MADE):
-            raise InputError(
-                f"'{attr_name}' cannot be set from outside: the environments were made with it. Give it when they are "
-                "made, or, for patient, load, reference and initial_angle_deg, to set_options."
-            )
-        for env in envs:
-            setattr(env, attr_name, value)
+        self.worlds.refuse_made(attr_name)
+        for i in self._get_indices(indices):
+            setattr(self.worlds.envs[i], attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: None | int | Iterable[int] = None, **method_kwargs: Any
@@ -104,7 +99,3 @@ class AssistanceVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: None | int | Iterable[int] = None) -> list[bool]:
         """False for each world: worlds have no wrappers."""
         return [False for _ in self._get_indices(indices)]
-
-
-MADE = ("drive", "task", "ecosystem", "population", "movement", "observer", "period", "duration", "solver")
-"""Attributes of an environment that follow from its settings."""

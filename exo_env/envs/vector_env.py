@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copy
+import threading
+import warnings
+from collections.abc import Callable, Sequence
+from functools import wraps
 from operator import attrgetter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import gymnasium
 import numpy as np
@@ -14,10 +18,11 @@ from gymnasium.vector.utils import batch_space
 from dms_core.errors import InputError, SimulationError, choices
 from dms_core.validation import plain
 from exo_env.envs.base_env import AssistanceEnv
+from exo_env.envs.copies import WithSpec
 from exo_env.envs.settings import check_whole
 from exo_env.tables import STATUS
 from exo_env.tasks.task import NOTHING, SOLVER, Task
-from exo_env.world.batch import Batch
+from exo_env.world.batch import ELSEWHERE, Batch
 from exo_env.world.episode import Episode
 from exo_env.world.reset import BEGUN
 
@@ -25,7 +30,31 @@ EPISODE = attrgetter("_episode")
 """Gives the episode of an environment, None where there is none: cheaper than the property, which raises."""
 
 
-class AssistanceVectorEnv(VectorEnv):
+MOST_STEPS, MOST_WORLDS, MOST_THREADS = 10**9, 10**6, 10**4
+"""Largest `max_episode_steps`, numbers of worlds and of threads."""
+
+
+def one_at_a_time(method: Callable) -> Callable:
+    """A method that refuses to begin while another thread is in one: two would move the same worlds at once."""
+
+    @wraps(method)
+    def alone(self: AssistanceVectorEnv, *given: Any, **named: Any) -> Any:
+        # To wait would hang in a process that was forked while a thread of its parent was in here.
+        if not self._turn.acquire(blocking=False):
+            raise gymnasium.error.AlreadyPendingCallError(
+                f"{method.__name__}() was called while another thread steps or resets this vector environment; expected"
+                " calls one after the other, or a vector environment for each thread.",
+                method.__name__,
+            )
+        try:
+            return method(self, *given, **named)
+        finally:
+            self._turn.release()
+
+    return alone
+
+
+class AssistanceVectorEnv(WithSpec, VectorEnv):
     """Many environments that compiled code steps in parallel, each the same to the last bit as alone.
 
     A subclass names the environment as `env_type`.
@@ -33,7 +62,7 @@ class AssistanceVectorEnv(VectorEnv):
     Args:
         num_envs: number of worlds.
         autoreset_mode: a gymnasium.vector.AutoresetMode: a new episode begins at the step after the last one's end
-            (default), at the same step, or at a call of `reset` only.
+            (default), at the same step, or at a call of `reset` only, which is the way for torchrl.
         threads: number of threads that step the worlds; None takes one for each core.
         max_episode_steps: control periods after which time ends an episode, as `gymnasium.make_vec` gives them; None
             and -1: those of the environment's `episode_duration`.
@@ -54,33 +83,39 @@ class AssistanceVectorEnv(VectorEnv):
         max_episode_steps: int | None = None,
         **settings: Any,
     ) -> None:
-        if not (isinstance(num_envs, int | np.integer) and num_envs >= 1):
-            raise InputError(f"num_envs = {num_envs!r}: expected a whole number from 1.")
-        if threads is not None and not (isinstance(threads, int) and threads >= 1):
-            raise InputError(f"threads = {threads!r}: expected a whole number from 1, or None.")
+        num_envs, threads, max_episode_steps = plain(num_envs), plain(threads), plain(max_episode_steps)
+        check_whole("num_envs", num_envs, MOST_WORLDS)
+        if threads is not None:
+            check_whole("threads", threads, MOST_THREADS)
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in [*AutoresetMode, *modes]:
             raise InputError(f"autoreset_mode = {autoreset_mode!r}: expected one of {choices(modes)}.")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.num_envs = int(num_envs)
-        self.envs = [self.env_type(**settings) for _ in range(self.num_envs)]
-        one = self.envs[0]
+        self.num_envs, self._turn = num_envs, threading.Lock()
+        one = self.env_type(**settings)
+        with warnings.catch_warnings():
+            # What the first one has said.
+            warnings.simplefilter("ignore")
+            self.envs = [one, *(self.env_type(**settings) for _ in range(num_envs - 1))]
         self.steps = one.steps
         """Control periods of an episode that no event ends."""
         if max_episode_steps not in (None, -1):
-            check_whole("max_episode_steps", plain(max_episode_steps), MOST_STEPS)
-            self.steps = min(self.steps, int(max_episode_steps))
+            check_whole("max_episode_steps", max_episode_steps, MOST_STEPS)
+            self.steps = min(self.steps, max_episode_steps)
         self.render_mode = one.render_mode
         self.metadata = {**one.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space, self.single_action_space = one.observation_space, one.action_space
         self.observation_space = batch_space(one.observation_space, self.num_envs)
         self.action_space = batch_space(one.action_space, self.num_envs)
         self._task: Task = one.task
-        places = np.array([place for _, place, _ in one.task.reported_places], np.int64)
-        self._batch = Batch(self.num_envs, one.observer.size, len(one.task.terms), places, threads)
-        self._over = np.ones(self.num_envs, bool)
-        self._episodes: list[Episode | None] = [None] * self.num_envs
+        self._batch = self._made_batch(threads)
+        self._over = np.ones(num_envs, bool)
+        self._episodes: list[Episode | None] = [None] * num_envs
         self._started = False
+
+    def _made_batch(self, threads: int | None) -> Batch:
+        places = np.array([place for _, place, _ in self._task.reported_places], np.int64)
+        return Batch(self.num_envs, self.envs[0].observer.size, len(self._task.terms), places, threads)
 
     @property
     def observation_structure(self) -> tuple:
@@ -105,6 +140,7 @@ class AssistanceVectorEnv(VectorEnv):
         mask = self._mask(options.pop("reset_mask", None))
         return self.reset_each(self._seeds(seed), [options] * self.num_envs, mask)
 
+    @one_at_a_time
     def reset_each(
         self, seeds: Sequence[int | None], options: Sequence[dict[str, Any]], mask: np.ndarray | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
@@ -142,11 +178,12 @@ class AssistanceVectorEnv(VectorEnv):
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """The seed of each world."""
+        seed = plain(seed)
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + i for i in range(self.num_envs)]
-        if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+        if isinstance(seed, int):
+            return [seed + i for i in range(self.num_envs)]
+        if not isinstance(seed, Sequence) or isinstance(seed, str):
             raise InputError(f"seed = {seed!r}: expected a whole number, or one for each of {self.num_envs} worlds.")
         if len(seed) != self.num_envs:
             raise InputError(f"{len(seed)} seeds for {self.num_envs} worlds: expected one seed, or one a world.")
@@ -178,6 +215,7 @@ class AssistanceVectorEnv(VectorEnv):
         self._batch.put(i, self.envs[i].packed)
         self._batch.take(i)
 
+    @one_at_a_time
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Do a control period of every world.
 
@@ -200,6 +238,8 @@ class AssistanceVectorEnv(VectorEnv):
         # Until the step is done to its end: what breaks it off leaves nothing to step.
         self._started = False
         for i in self._batch.run(which, used):
+            if self._batch.status[i, STATUS.code] == ELSEWHERE:
+                raise gymnasium.error.ResetNeeded(f"World {i} was stepped by itself; call reset() of the batch.")
             self.envs[i].rescue()
             self._take_over(i)
         status = self._batch.status
@@ -274,9 +314,70 @@ class AssistanceVectorEnv(VectorEnv):
         """A picture of each world."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
+    def __copy__(self) -> Self:
+        """A copy with worlds and generators of its own."""
+        return copy.deepcopy(self)
+
+    @one_at_a_time
     def __getstate__(self) -> dict[str, Any]:
-        """Refuse copies: the worlds are addresses of this process."""
-        raise TypeError(f"{type(self).__name__} cannot be copied or pickled; make another one of the same settings.")
+        """All attributes but those of one process, which a copy makes anew; the episodes go along with their worlds."""
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("_batch", "_episodes", "_turn")}
+        return kept | {"_threads": self._batch.threads}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        threads = state.pop("_threads")
+        self.__dict__.update(state, _turn=threading.Lock(), _episodes=[None] * state["num_envs"])
+        self._batch = self._made_batch(threads)
+        for i, env in enumerate(self.envs):
+            if env.under_way:
+                self._episodes[i] = env.episode
+                self._take_over(i)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Generator of each world."""
+        return self.get_attr("np_random")
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Seed of each world's generator."""
+        return self.get_attr("np_random_seed")
+
+    def call(self, name: str, *given: Any, **named: Any) -> tuple[Any, ...]:
+        """What a method gives for each world, or an attribute of each."""
+        found = [getattr(env, name) for env in self.envs]
+        return tuple(x(*given, **named) if callable(x) else x for x in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each world."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each world: a list or tuple has one value a world, anything else is for all.
+
+        Raises:
+            InputError: it is a setting, from which the environment was made, or there are too few or too many values.
+        """
+        each = list(values) if isinstance(values, list | tuple) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise InputError(
+                f"set_attr('{name}'): {len(each)} values for {self.num_envs} worlds; expected one a world."
+            )
+        self.refuse_made(name)
+        for env, value in zip(self.envs, each, strict=True):
+            setattr(env, name, value)
+
+    def refuse_made(self, name: str) -> None:
+        """Refuse to set what environments were made with, or what follows from it.
+
+        Raises:
+            InputError: says what to do instead.
+        """
+        if name in (*self.env_type.settings_type.model_fields, *MADE):
+            raise InputError(
+                f"'{name}' cannot be set from outside: the environments were made with it. Give it when they are made, "
+                "or, for patient, load, reference and initial_angle_deg, to set_reset_options."
+            )
 
     def close_extras(self, **kwargs: Any) -> None:
         """End threads and windows."""
@@ -285,7 +386,7 @@ class AssistanceVectorEnv(VectorEnv):
             env.close()
 
 
-MOST_STEPS = 10**9
-"""Largest `max_episode_steps`."""
+MADE = ("drive", "task", "ecosystem", "population", "movement", "observer", "period", "duration", "steps", "solver")
+"""Attributes of an environment that follow from its settings."""
 GROUPED = ("reward_terms", "reward_weights")
 """Keys of a step's infos that hold one number for each world and reward term."""

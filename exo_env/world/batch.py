@@ -18,6 +18,8 @@ from exo_env.world.reset import BEGUN, begin_episode
 from exo_env.world.work_sharing import AREAS, areas_of, claim, fetch_ahead
 
 FIELDS = len(WORLD)
+ELSEWHERE = -1
+"""Code of a world that something else than the batch has moved."""
 BESIDE = (
     "noise", "tremor", "wanted", "course", "preview", "lacking", "newton", "newton_lu", "rates", "rate_lu", "draw",
     "scaling", "subject", "rest", "cleared",
@@ -50,7 +52,7 @@ def run_some(addresses, areas, which, actions, reported, observations, numbers, 
     """A control period of worlds which[k] that no other thread has taken, until all are done.
 
     `done` counts those that are taken; the world `ahead` of them is fetched. Where the solver gives up, `status` holds
-    its code.
+    its code; ELSEWHERE where a world is not at the control time at which the batch left it, and was not stepped.
     """
     k = claim(done)
     while k < which.shape[0]:
@@ -58,7 +60,9 @@ def run_some(addresses, areas, which, actions, reported, observations, numbers, 
             fetch_ahead(areas[which[k + ahead]])
         i = which[k]
         w = table_at(addresses[i], FIELDS)
-        if run_period(w, actions[i]) == DONE:
+        if ints(w, WORLD.status)[STATUS.step] != status[i, STATUS.step]:
+            status[i, STATUS.code] = ELSEWHERE
+        elif run_period(w, actions[i]) == DONE:
             collect(w, reported, observations[i], numbers[i], status[i])
         else:
             status[i, STATUS.code] = ints(w, WORLD.status)[STATUS.code]
@@ -103,8 +107,9 @@ class Batch:
         self.observations = np.zeros((size, observed), np.float32)
         self.numbers = np.zeros((size, 1 + terms + len(reported)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
-        # The thread that calls works, too.
-        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._pool: ThreadPoolExecutor | None = None
+        self._process = 0
+        """Process in which the threads were made."""
 
     def put(self, i: int, world: Packed) -> None:
         """Make the packed WorldTables world i."""
@@ -135,7 +140,7 @@ class Batch:
         """Step the worlds `which`, shape (k,), with their rows of actions, shape (size, n).
 
         Returns:
-            Numbers of the worlds whose solver gave up.
+            Numbers of the worlds that were not stepped to the end, with the code of each in `status`.
         """
         self._share(
             len(which), run_some, self._addresses, self._areas, which, actions, self._reported, self.observations,
@@ -146,20 +151,29 @@ class Batch:
     def _share(self, count: int, work: Callable, *arguments: Any) -> None:
         """Do `count` pieces of work on all threads; its last argument counts those that are taken."""
         share, jobs = partial(work, *arguments, np.zeros(1, np.int64)), list[Future]()
+        # The thread that calls works, too.
+        others = min(self.threads, count) - 1
         try:
-            if self._pool:
-                jobs += [self._pool.submit(share) for _ in range(min(self.threads, count) - 1)]
+            if others > 0:
+                pool = self._helpers()
+                jobs += [pool.submit(share) for _ in range(others)]
             share()
         finally:
             _wait(jobs)
         for job in jobs:
             job.result()
 
+    def _helpers(self) -> ThreadPoolExecutor:
+        """The other threads; a process that was forked has those of its parent no more, and makes its own."""
+        if self._pool is None or self._process != os.getpid():
+            self._pool, self._process = ThreadPoolExecutor(self.threads - 1), os.getpid()
+        return self._pool
+
     def close(self) -> None:
         """End the threads."""
-        if self._pool is not None:
+        if self._pool is not None and self._process == os.getpid():
             self._pool.shutdown()
-            self._pool = None
+        self._pool, self.threads = None, 1
 
 
 def _wait(jobs: list[Future]) -> None:

@@ -29,6 +29,7 @@ from dms_core.kernels import (
 )
 from dms_core.model.geometry.rotations import dot, vec
 from exo_env.clearing import clear
+from exo_env.drives.drive import start_apart
 from exo_env.ecosystem.exoskeleton import link_moment, rope_lever
 from exo_env.ecosystem.gym_machine import clearances
 from exo_env.jit import compiled
@@ -56,7 +57,7 @@ from exo_env.tables import (
 from exo_env.tasks.course import course_of
 from exo_env.tasks.noise import IMPERFECTION
 from exo_env.world.control_period import begin, effort_of, options_of
-from exo_env.world.rest_pose import hinge_angle, hinge_transmission, put_rest
+from exo_env.world.rest_pose import MOVING, hinge_angle, hinge_transmission, put_rest
 from exo_env.world.scaling import put_numbers
 
 STILL, BESIDE = 1e-9, 2
@@ -200,8 +201,9 @@ def put_inputs(w, arm, load, activations):
     tension = (needed - muscle_moment(arm, angle, activations)) / lever
     signals = inner(inner(inner(w, WORLD.dynamics), DYNAMICS.state), STATE.signals)
     commands, start, rows = floats(drive, DRIVE.commands), matrix(drive, DRIVE.start), ints(drive, DRIVE.rows)
+    apart = start_apart(w)
     for i in range(commands.shape[0]):
-        commands[i] = start[0, i] + min(max(tension, 0.0), start[1, i])
+        commands[i] = start[0, i] + min(max(tension, 0.0), start[1, i]) + start[2, i] * apart
         hold(signals, rows[i], commands[i])
     rows = ints(inner(w, WORLD.patient), PATIENT_TABLES.rows)
     for i in range(rows.shape[0]):
@@ -227,6 +229,10 @@ def put_world(w, arm, load, activations):
     motors, commands = inner(drive, DRIVE.motors), floats(drive, DRIVE.commands)
     for k in range(motors.shape[0]):
         q[motors[k, 0]] = commands[motors[k, 1]]
+    # The controller's error counts what it adds to psi.
+    offset, pid = ints(rest, REST.offset), ints(rest, REST.places)[MOVING.pid]
+    for k in range(offset.shape[0]):
+        v[pid] += q[offset[k]]
     rewind(inner(inner(w, WORLD.dynamics), DYNAMICS.state), q, v, FIRST_STEP * floats(w, WORLD.period)[0])
 
 

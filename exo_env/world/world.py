@@ -13,7 +13,7 @@ import numpy as np
 from dms_core import Model, SolverOptions, World
 from dms_core.errors import InputError, SimulationError
 from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
-from dms_core.model import MinimumJerk, RopeActuator
+from dms_core.model import MinimumJerk, Pid, RopeActuator
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
 from exo_env.drives.checked import check_motors
@@ -231,11 +231,13 @@ class PatientWorld:
     def _rest(self) -> RestTables:
         at, calls = self.model.layout.offset, self.model.tables.values.constraints
         joints = [c.element.name for c in self.model.layout.constraints]
+        added = [f.offset for f in self.model.system.forces if isinstance(f, Pid) and f.name == PID and f.offset]
         return RestTables(
             orientation=self._worn.orientation, misaligned=np.array([int(not self._worn.aligned)]),
             shift=np.ascontiguousarray(self._worn.shift), guided=np.ascontiguousarray(self._worn.guided_point),
             link_centre=np.array(self.ecosystem.device.lower_link.centre_of_mass),
             places=np.array([at[name] for name in NAMES_AT_REST]), fibres=np.array([at[m] for m in self._arm.muscles]),
+            offset=np.array([self.model.layout.index[name] for name in added], np.int64),
             rope=calls.par_ptr[[joints.index(ROPE)]], v=np.zeros(self.model.n_q),
         )  # fmt: skip
 

@@ -41,6 +41,7 @@ def two(**changes):
         ({"commands": two(rate=-5.0)}, "command 'two': rate = -5.0"),
         ({"commands": two(start=math.inf)}, "command 'two': start = inf"),
         ({"commands": two(holds=-1.0)}, "command 'two': holds = -1.0"),
+        ({"commands": two(apart=math.nan)}, "command 'two': apart = nan; expected a finite number"),
         ({"commands": two(name="one")}, "commands = .'one', 'one'.; expected different names"),
         ({"commands": ()}, r"commands = \[\]; expected different names, at least one"),
         ({"actions": ("up",)}, "1 actions for 2 commands"),

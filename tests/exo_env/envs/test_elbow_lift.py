@@ -1,6 +1,5 @@
 """Options of a reset and readings of exo/ElbowLift."""
 
-import copy
 import math
 
 import gymnasium
@@ -95,26 +94,6 @@ def test_a_reference_that_the_episode_cuts_off_is_told():
         ElbowLiftEnv(reference={"duration": 4.0, "pause": 0.5})
 
 
-def test_a_copy_is_the_same_environment():
-    class Mine(ElbowLiftEnv):
-        def __init__(self, bonus, **settings):
-            super().__init__(**settings)
-            self.bonus = bonus
-
-    patient = {"strength": 0.7}
-    env = Mine(2.0, patient=patient, load=1.0)
-    env.reset(seed=3)
-    env.action_space.seed(5)
-    env.note = "kept"
-    patient["strength"] = 0.1
-    twin = copy.deepcopy(env)
-    assert twin.bonus == 2.0 and twin.note == "kept"
-    np.testing.assert_array_equal(twin.action_space.sample(), env.action_space.sample())
-    (a, told), (b, _) = twin.reset(), env.reset()
-    np.testing.assert_array_equal(a, b)
-    assert told["patient"]["strength"] == 0.7
-
-
 def test_device_groups_of_three_ropes():
     """Muscles, ropes and motors come from the ecosystem: a third rope is a third action."""
     third = {"upper": [0.0, 0.18, 0.05], "lower": [0.0338, -0.0725, 0.05], "pulls": "flexion"}
@@ -127,26 +106,3 @@ def test_device_groups_of_three_ropes():
     r = env.readings()
     assert r["second_tension"] > 40.0 and observation[4] == pytest.approx(r["second_tension"] / 100.0, abs=0.05)
     assert r["solver.largest_phi"] < 1e-9
-
-
-def test_a_copy_draws_from_a_generator_of_its_own(env):
-    env.reset(seed=4)
-    twin = copy.copy(env)
-    twin.reset()
-    with pytest.raises(gymnasium.error.ResetNeeded, match="A copy begins without one"):
-        _ = copy.copy(env).episode
-    assert env.reset()[1] == twin.start_info()
-
-
-def test_numbers_of_numpy_are_taken_as_pythons():
-    number = {
-        "control_rate": np.float32(50), "load": np.float32(1), "cycle": np.int64(3), "repetitions": np.int64(1),
-        "episode_duration": np.float64(2), "rtol": np.float64(1e-3), "patient": {"strength": np.float32(0.5)},
-    }  # fmt: skip
-    python = {name: value if isinstance(value, dict) else value.item() for name, value in number.items()}
-    first, second = ElbowLiftEnv(**number), ElbowLiftEnv(**python)
-    options = {"load": np.float32(1.5), "initial_angle_deg": np.int64(40)}
-    given = first.reset(seed=np.int64(3), options=options)
-    wanted = second.reset(seed=3, options={"load": 1.5, "initial_angle_deg": 40})
-    np.testing.assert_array_equal(given[0], wanted[0])
-    assert given[1] == wanted[1]

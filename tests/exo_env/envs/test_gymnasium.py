@@ -1,7 +1,6 @@
 """The environment as Gymnasium wants it: checker, spec, seeds, pickles, wrappers. Vectors: test_vector.py."""
 
 import json
-import pickle
 import subprocess
 import sys
 import warnings
@@ -79,17 +78,6 @@ def test_without_a_seed_the_generator_goes_on(env):
     second = env.reset()[1]
     env.reset(seed=2)
     assert second == env.reset()[1]
-
-
-def test_a_pickled_environment_goes_on_with_its_generator(make):
-    env = make(patient="healthy", observation=["device", "emg"]).unwrapped
-    env.reset(seed=5)
-    twin = pickle.loads(pickle.dumps(env))
-    with pytest.raises(gymnasium.error.ResetNeeded):
-        twin.step(ACTION)
-    (a, one), (b, other) = env.reset(), twin.reset()
-    np.testing.assert_array_equal(a, b)
-    assert one == other and twin.observation_space == env.observation_space
 
 
 def test_episode_statistics(make):
