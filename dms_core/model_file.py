@@ -25,7 +25,7 @@ from dms_core.model.signals import Function, Input
 from dms_core.model.system import System
 from dms_core.validation import cut, shown
 from dms_core.yaml_builder import Section
-from dms_core.yaml_text import read_yaml, write_yaml
+from dms_core.yaml_text import read_yaml, yaml_of
 
 BRANCHES: dict[str, type[Declaration]] = {
     "bodies": Body,
@@ -139,7 +139,7 @@ def dump(system: System) -> str:
         declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm)]
         if declared:
             content[section] = [_plain(e) for e in declared]
-    return write_yaml(content, default_flow_style=None, allow_unicode=True)
+    return yaml_of(content, default_flow_style=None, allow_unicode=True)
 
 
 def _plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import yaml
 
@@ -72,21 +72,14 @@ def read_value(text: str) -> Any:
         raise InputError(_sentence(f"value {shown(text)}", error, text, place=False)) from None
 
 
-def write_yaml(content: Any, file: IO[str] | None = None, **layout: Any) -> str:
-    """Write what `read_yaml` and readers of YAML 1.1 read back as it was.
+def yaml_of(content: Any, **layout: Any) -> str:
+    """The text that `read_yaml` and readers of YAML 1.1 read back as it was.
 
     Args:
         content: mappings, lists and scalars.
-        file: where to; None: nowhere.
         layout: arguments of `yaml.dump`.
-
-    Returns:
-        The text.
     """
-    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, width=120, **layout)
-    if file is not None:
-        file.write(text)
-    return text
+    return yaml.dump(content, Dumper=_Dumper, sort_keys=False, width=120, **layout)
 
 
 class _Dumper(yaml.SafeDumper):

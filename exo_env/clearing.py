@@ -13,8 +13,8 @@ from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import Packed, floats
-from exo_env.jit import compiled
 
 Kept = Annotated[np.ndarray, "kept"]
 Filled = Annotated[np.ndarray, "filled"]

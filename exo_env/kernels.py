@@ -10,8 +10,8 @@ All tables and their fields are in exo_env/tables.py. The machine code is kept o
 changed that went into it: the kernel, what it calls, and the constants that they name, in whichever file.
 """
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import flags, floats, inner, ints, matrix
-from exo_env.jit import compiled
 from exo_env.places import places
 from exo_env.tables import (
     DRAW,

@@ -17,7 +17,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 
 _WORD = np.uint64(0xFFFFFFFF)
 _HALF = np.uint64(32)

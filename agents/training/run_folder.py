@@ -22,7 +22,7 @@ from typing import Any
 from dms_core.errors import InputError
 from dms_core.output_file import write_json, write_text
 from dms_core.output_place import check_writable
-from dms_core.yaml_text import write_yaml
+from dms_core.yaml_text import yaml_of
 
 from ..checkpoint import Store
 from ..environment import environment_id
@@ -83,7 +83,7 @@ class RunFolder:
 
     def write_config(self, config: Config) -> None:
         """Keep the configuration."""
-        write_text(self.path / CONFIG, write_yaml(config.content()))
+        write_text(self.path / CONFIG, yaml_of(config.content()))
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

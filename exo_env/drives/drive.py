@@ -22,6 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError
 from dms_core.kernels import floats, inner, ints, matrix
 from dms_core.model import Constant, Input
@@ -29,7 +30,6 @@ from dms_core.model.element import Force
 from dms_core.validation import plain
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
-from exo_env.jit import compiled
 from exo_env.settings import Settings
 from exo_env.tables import DRAW, DRIVE, GIVEN, PLAN, STATUS, WORLD
 

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner
 from dms_core.model import ReferenceFilter
 from dms_core.model.element import Force
@@ -20,7 +21,6 @@ from exo_env.drives.drive import Command, Drive, affine, still_apart
 from exo_env.ecosystem.ecosystem import ASSISTANCE, REFERENCE
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
-from exo_env.jit import compiled
 from exo_env.tables import DRIVE, WORLD
 
 SETPOINT, FILTER = "setpoint", "setpoint_filter"

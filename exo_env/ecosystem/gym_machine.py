@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import Field
 
 from dms_core.bracket import narrowed, trial
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError
 from dms_core.model import GROUND, JointSpringDamper, PathPoint, Revolute, RigidBody, RopeLength, Slider
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.geometry.frames import quaternion
 from dms_core.model.geometry.rotations import cross, dot, scale, sub, turned
 from exo_env.ecosystem.arm import Arm
-from exo_env.jit import compiled
 from exo_env.settings import Settings
 
 HANDLE, WEIGHT, ROPE, GRIP_JOINT = "handle", "weight", "gym_rope", "grip"

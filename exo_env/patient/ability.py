@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import dot, vec
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.ecosystem.exoskeleton import link_moment
-from exo_env.jit import compiled
 from exo_env.patient.motor_command import InternalModel
 from exo_env.patient.patient import PATIENT, Patient
 from exo_env.patient.static_optimisation import muscle_moment, needed_moment

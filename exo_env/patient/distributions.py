@@ -22,9 +22,9 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import ndtr, ndtri
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, choices
 from dms_core.validation import shown
-from exo_env.jit import compiled
 from exo_env.settings import Settings
 from exo_env.streams import normal_quantile, streams, uniforms
 

@@ -29,9 +29,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.model.muscles.activation import MINIMUM, limited
 from exo_env.clearing import Cleared, Kept
-from exo_env.jit import compiled
 from exo_env.patient.fatigue import advance_fatigue
 from exo_env.patient.patient import LONGEST_DELAY, PATIENT
 from exo_env.patient.slacking import advance_effort

@@ -13,7 +13,7 @@ not the muscle's: what the muscle receives is min(T, 1 - M_F), and the muscle ha
 
 from __future__ import annotations
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 
 L = 10.0
 """Speed at which units are recruited and let go [1/s]."""

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 
 MOST_EFFORT = 2.0
 """Largest multiple of what was planned [-]."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import add, cross, dot, sub, turned, vec
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.muscles.fibre import (
@@ -22,7 +23,6 @@ from dms_core.model.muscles.fibre import (
     tendon_state,
 )
 from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
-from exo_env.jit import compiled
 
 TOE_GROWTH = math.expm1(TOE_SHAPE)
 

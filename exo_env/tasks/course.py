@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 
 
 @compiled

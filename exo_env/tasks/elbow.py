@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner, matrix
 from exo_env.ecosystem.sensors import muscle_sensor, tension_sensor
-from exo_env.jit import compiled
 from exo_env.patient.effort import PRESENT
 from exo_env.patient.slacking import MOST_EFFORT
 from exo_env.places import places

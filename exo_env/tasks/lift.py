@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner, matrix
-from exo_env.jit import compiled
 from exo_env.places import places
 from exo_env.settings import Settings
 from exo_env.tables import DRIVE, PLAN, WORLD

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import Field, model_validator
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 from exo_env.settings import Settings
 from exo_env.tasks.task import FIRST_EVENT, NOTHING
 

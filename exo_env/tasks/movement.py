@@ -20,9 +20,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError
 from dms_core.kernels import floats, inner, matrix
-from exo_env.jit import compiled
 from exo_env.patient.distributions import Distribution, Draws, distribution
 from exo_env.places import places
 from exo_env.settings import Settings, given_mapping

@@ -5,7 +5,7 @@ The result is divided by the channel's scale, so that observations are of order 
 
 from __future__ import annotations
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 from exo_env.places import places
 
 IMPERFECTION = places(("deviation", "quantum", "scale", "low", "high", "whole", "part"))

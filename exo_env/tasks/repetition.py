@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner, matrix
 from dms_core.model import MinimumJerk
-from exo_env.jit import compiled
 from exo_env.places import places
 from exo_env.settings import Settings
 from exo_env.tables import PLAN, WORLD

@@ -30,7 +30,7 @@ import math
 
 from pydantic import Field
 
-from exo_env.jit import compiled
+from dms_core.compiled.jit import compiled
 from exo_env.places import places
 from exo_env.settings import Settings
 

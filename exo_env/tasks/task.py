@@ -31,9 +31,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import choices
 from dms_core.kernels import floats, inner, ints
-from exo_env.jit import compiled
 from exo_env.settings import Settings, given_mapping
 from exo_env.tables import STATUS, TASK, WORLD
 from exo_env.tasks.channels import Channel, Parts, Reading, Slice, first_places

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import DONE, Packed, floats, inner, ints, table_at
-from exo_env.jit import compiled
 from exo_env.tables import OBSERVER, STATUS, TASK, WORLD
 from exo_env.world.control_period import run_period
 from exo_env.world.reset import BEGUN, begin_episode

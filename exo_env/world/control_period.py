@@ -9,6 +9,7 @@ Python lock.
 
 from __future__ import annotations
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import (
     DONE,
     SIGNALS,
@@ -23,7 +24,6 @@ from dms_core.kernels import (
     matrix,
     read_sensors,
 )
-from exo_env.jit import compiled
 from exo_env.patient.effort import EffortState, step_effort
 from exo_env.tables import (
     DRIVE,

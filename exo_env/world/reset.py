@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import (
     SIGNALS,
     STATE,
@@ -32,7 +33,6 @@ from exo_env.clearing import clear
 from exo_env.drives.drive import start_apart
 from exo_env.ecosystem.exoskeleton import link_moment, rope_lever
 from exo_env.ecosystem.gym_machine import clearances
-from exo_env.jit import compiled
 from exo_env.patient.ability import put_lacking
 from exo_env.patient.effort import reset_effort, start_excitation
 from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS

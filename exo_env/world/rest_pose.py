@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner, ints, matrix
 from dms_core.model.geometry.rotations import add, cross, dot, rotated, sub, turned, vec
 from dms_core.model.muscles.fibre import fibre_at_rest
 from exo_env.ecosystem.gym_machine import handle_angle
-from exo_env.jit import compiled
 from exo_env.patient.static_optimisation import path_geometry
 from exo_env.places import places
 from exo_env.tables import DRIVE, REST, SUBJECT, WORLD

@@ -23,6 +23,7 @@ import numpy as np
 
 from dms_core import Model
 from dms_core.assembly.layout import Layout, same_structure
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, ModelError
 from dms_core.kernels import floats, inner, matrix
 from dms_core.model import Constant, System
@@ -32,7 +33,6 @@ from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.gym_machine import ROPE
 from exo_env.ecosystem.person import HEIGHT_0, JOINT_TRAITS, MASS_0, SEXES, Person, Sex
-from exo_env.jit import compiled
 from exo_env.patient.motor_command import arm_table
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.places import places

@@ -15,8 +15,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from dms_core.compiled.jit import compiled
 from dms_core.kernels import Packed
-from exo_env.jit import compiled
 
 LINE = 64
 """Bytes of memory that a processor fetches at once."""

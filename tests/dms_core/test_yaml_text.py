@@ -13,7 +13,7 @@ import yaml
 import dms_core.yaml_builder as builder
 from dms_core.errors import InputError
 from dms_core.yaml_builder import MOST_VALUES
-from dms_core.yaml_text import MOST_PORTABLE, parse_yaml, read_value, read_yaml, write_yaml
+from dms_core.yaml_text import MOST_PORTABLE, parse_yaml, read_value, read_yaml, yaml_of
 
 MOST_SECONDS, MOST_MEGABYTES = 2.0, 100
 
@@ -249,7 +249,7 @@ def test_only_files_of_a_usual_size_are_read(kind, words, tmp_path):
 )
 def test_what_is_written_is_read_back_by_both_versions(text):
     content = {text: [text, 1e-05, 1e16, 3, True, None, float("inf"), {"x": "é"}]}
-    written = write_yaml(content)
+    written = yaml_of(content)
     assert parse_yaml(written, "f.yaml") == parse_yaml(written, "f.yaml", portable=True) == content
     assert yaml.safe_load(written) == content
 

@@ -13,7 +13,7 @@ from agents.training.config import Config
 from agents.training.rl_zoo_text import read_call, write_call
 from dms_core.config_files import configs
 from dms_core.errors import InputError
-from dms_core.yaml_text import write_yaml
+from dms_core.yaml_text import yaml_of
 from tests.agents.tiny import config_file, content
 
 SHIPPED = sorted((configs() / "agents").rglob("*.yml"))
@@ -228,8 +228,7 @@ def test_a_value_of_set_is_read_as_yaml_1_2_and_kept_for_both(tmp_path):
     used = Config.read(config_file(tmp_path), ["n_timesteps=1e5", "n_steps=010", "env_kwargs.patient='1e5'"])
     assert (used.n_timesteps, used.arguments["n_steps"]) == (100_000, 10)
     kept = tmp_path / "kept.yml"
-    with kept.open("w") as file:
-        write_yaml(used.content(), file)
+    kept.write_text(yaml_of(used.content()))
     assert Config.read(kept).content() == used.content()
     assert yaml.safe_load(kept.read_text())[ENVIRONMENT]["env_kwargs"]["patient"] == "1e5"
 

@@ -6,9 +6,9 @@ import gymnasium
 import numpy as np
 import pytest
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, SimulationError
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
-from exo_env.jit import compiled
 from exo_env.patient.distributions import Draws, distribution
 from exo_env.patient.motor_command import SETTLED, InternalModel, plan_course
 from exo_env.patient.patient import PATIENT, Patient, fields_of
