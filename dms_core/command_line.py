@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import signal
 import sys
@@ -64,6 +65,7 @@ def run_command(
     commands: dict[str, Callable[..., Any]], prog: str, description: str, arguments: list[str] | None
 ) -> int:
     """Run one of the commands; a mistake of the user is one message on stderr and status 2."""
+    _open_streams()
     try:
         _check_options(sys.argv[1:] if arguments is None else arguments)
         with _sentences_of_warnings(), _terminated_as_interrupted():
@@ -77,14 +79,40 @@ def run_command(
         print(f"stopped: {str(stop) or 'nothing was written.'}", file=sys.stderr)
         return STOPPED
     except BrokenPipeError:
-        # The reader (head, less) has seen enough; what is left to flush at exit must not complain either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader (head, less) has seen enough.
+        _close_stdout()
         return 0
     except OSError as error:
-        where = f"'{error.filename}': " if error.filename is not None else ""
+        # Files are written under their names; what has none is printed.
+        where = f"'{error.filename}'" if error.filename is not None else "standard output"
         advice = f"; {REMEDIES[error.errno]}" if error.errno in REMEDIES else ""
-        print(f"error: {where}{error.strerror or error}{advice}.", file=sys.stderr)
+        print(f"error: {where}: {error.strerror or error}{advice}.", file=sys.stderr)
+        _check_stdout()
         return FAILED_RUN
+
+
+def _open_streams() -> None:
+    """What is closed goes nowhere; what the terminal's encoding has no sign for is replaced, as stderr does it."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif name == "stdout" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _check_stdout() -> None:
+    """Close standard output if what was printed cannot be written."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _close_stdout()
+
+
+def _close_stdout() -> None:
+    """What is left to flush at exit goes nowhere: it cannot be written, and must not complain again."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager
