@@ -42,7 +42,7 @@ def make(environment: str, **settings: Any) -> gymnasium.Env:
     Raises:
         InputError: the id is not registered, or a setting is not usable.
     """
-    return gymnasium.make(environment_id(environment), disable_env_checker=True, **settings)
+    return gymnasium.make(spec_of(environment).id, disable_env_checker=True, **settings)
 
 
 def check_settings(environment: str, settings: Mapping[str, Any]) -> None:

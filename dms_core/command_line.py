@@ -31,6 +31,8 @@ def _place(kind: str, metavar: str) -> PrimitiveConstructorSpec[Path]:
         (text,) = given
         if not text or "\0" in text:
             raise InputError(f"Expected the name of a {kind}, got {text!r}.")
+        if text == "-":
+            raise InputError(f"Expected the name of a {kind}, got '-'; standard output is /dev/stdout.")
         if kind == "file" and text.endswith(("/", os.sep)):
             raise InputError(f"Expected the name of a file, got that of a folder, '{text}'.")
         return Path(text)

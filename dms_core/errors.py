@@ -9,11 +9,21 @@ def both_ends(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most // 2]} [...] {text[-most // 2 :]}"
 
 
+def printable(text: str) -> str:
+    """A text with escapes in place of what is not printed; line breaks stay."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+
+
 class DmsError(Exception):
-    """Base of every error that dms_core raises on purpose. Of a long message both ends are kept."""
+    """Base of every error that dms_core raises on purpose.
+
+    Of a long message both ends are kept, and what it quotes cannot control a terminal.
+    """
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(both_ends(message, MOST_CHARACTERS))
+        super().__init__(both_ends(printable(message), MOST_CHARACTERS))
 
 
 class ModelError(DmsError, ValueError):

@@ -8,6 +8,7 @@ Each sentence names the element, the key, the value and what would be right:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
@@ -47,7 +48,7 @@ _EXPECTED: dict[str, str] = {
 """What would have been right, by pydantic's type of error; the fields in braces are those of its context."""
 
 
-LONGEST, MOST_SENTENCES, LONGEST_SENTENCE = 70, 8, 1500
+LONGEST, MOST_SENTENCES, LONGEST_SENTENCE = 70, 5, 1000
 """Characters of a value in a message, sentences of a message, and characters of a sentence."""
 
 
@@ -112,7 +113,7 @@ def sentences(error: ValidationError, who: str, allowed: Any = ()) -> str:
         who: what the values are for, such as "revolute 'elbow'".
         allowed: the keys that exist.
     """
-    found, lengths = error.errors(), dict[tuple, int]()
+    found, lengths = _without_repeats(error.errors()), dict[tuple, int]()
     for e in found:
         if e["type"] == "missing" and e["loc"] and isinstance(e["loc"][-1], int):
             lengths[e["loc"][:-1]] = e["loc"][-1] + 1
@@ -124,13 +125,26 @@ def sentences(error: ValidationError, who: str, allowed: Any = ()) -> str:
     return "\n".join(lines)
 
 
+def _without_repeats(found: list[Any]) -> list[Any]:
+    """Mistakes, those of unknown keys first and as one for each mapping: a file of another kind has many of them."""
+    unknown: dict[tuple, Any] = {}
+    for e in found:
+        if e["type"] == "extra_forbidden":
+            first = unknown.setdefault(e["loc"][:-1], e)
+            first.setdefault("keys", []).append(str(e["loc"][-1]))
+    return [*unknown.values(), *(e for e in found if e["type"] != "extra_forbidden")]
+
+
 def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping[tuple, int]) -> str:
     """The sentence of one mistake; `lengths` holds the right one of each list that is too short."""
     kind, where, value = error["type"], error["loc"], error["input"]
-    key = ".".join(str(x) for x in where)
+    key = ".".join(str(x) for x in where if not _of_pydantic(x))
     if kind == "extra_forbidden":
         known = f" Allowed: {choices(allowed)}." if len(where) == 1 and allowed else ""
-        return f"{who}: unknown key '{key}'.{known}"
+        inside = "".join(f"{x}." for x in where[:-1] if not _of_pydantic(x))
+        keys = [f"'{inside}{cut(x)}'" for x in error["keys"][:MOST_SENTENCES]]
+        more = f" and {len(error['keys']) - len(keys)} others" if len(error["keys"]) > len(keys) else ""
+        return f"{who}: unknown key{'s' if len(error['keys']) > 1 else ''} {', '.join(keys)}{more}.{known}"
     if kind == "missing" and where[:-1] in lengths:
         key = ".".join(str(x) for x in where[:-1])
         return f"{who}: {key} = {shown(value)}: Expected {lengths[where[:-1]]} items, got {len(value)}."
@@ -138,10 +152,16 @@ def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping
         return f"{who}: '{key}' is missing."
     if isinstance(error.get("ctx", {}).get("error"), DmsError):
         # A part with checks of its own (a path point, a signal) has named key and value already.
-        said = f"{error['msg'].removeprefix('Value error, ').rstrip('.')}."
+        first, *more = error["msg"].removeprefix("Value error, ").splitlines()
+        said = f"{first.rstrip('.')}." + (f" ({len(more)} further mistakes there.)" if more else "")
         return f"{who}: {key}: {said}" if key else f"{who}: {said}"
     said = _right(kind, error.get("ctx", {}), error["msg"])
     return f"{who}: {key} = {shown(value)}: {said}" if key else f"{who}: {said}"
+
+
+def _of_pydantic(place: Any) -> bool:
+    """Whether a part of a mistake's place is pydantic's name of a type, where one of several was expected."""
+    return isinstance(place, str) and bool(re.fullmatch(r"[a-z-]+\[.*\]|float|int|str|bool", place))
 
 
 def shown(value: Any) -> str:

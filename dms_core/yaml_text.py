@@ -25,6 +25,8 @@ from dms_core.yaml_scalars import NUMBER, STANDARD, UNPRINTABLE
 
 MOST_PORTABLE = 100_000
 """Largest file that is read by PyYAML's own parser, as rl_zoo3 does [bytes]; it takes up to 10 s for a megabyte."""
+MOST_DIRECTIVES = 100
+"""Most lines that begin with %: libyaml compares each %TAG with all others."""
 SHORT = 20_000
 """Longest text of which the content is kept [characters]."""
 
@@ -103,6 +105,8 @@ def _parsed(text: str, portable: bool) -> Any:
         line, column = before.count("\n"), found.start() - before.rfind("\n") - 1
         mark: Any = yaml.Mark("", found.start(), line, column, "", 0)
         raise Refused(problem=f"the character {found[0]!r} is not allowed", problem_mark=mark)
+    if sum(line.startswith("%") for line in text.splitlines()) > MOST_DIRECTIVES:
+        raise Refused(problem=f"more than {MOST_DIRECTIVES} lines begin with %, as directives do")
     try:
         return Builder(text, portable).document()
     except (ValueError, OverflowError) as error:  # numbers of escapes and directives that PyYAML does not check

@@ -18,6 +18,7 @@ MOVED = {
     "fitting": "world.scaling",
     "gym_machine": "ecosystem.gym_machine",
     "human": "ecosystem.arm",
+    "jit": "kernels",
     "lift_env": "envs.elbow_lift",
     "lift_settings": "envs.settings",
     "measures": "paper.summary",

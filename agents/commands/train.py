@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -118,6 +119,7 @@ def _stopping() -> Iterator[Any]:
     def ask(number: int, frame: Any) -> None:
         asked.append(number)
         signal.signal(number, before[number])
+        print("\nstopping after this step; Ctrl-C once more stops at once", file=sys.stderr, flush=True)
 
     before: dict[int, Any] = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     for number in before:

@@ -17,7 +17,7 @@ from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
-from dms_core.compiled.code_key import code_key
+from dms_core.compiled.code_key import NoKeyError, code_key
 from dms_core.compiled.compilation import write
 
 CHECKSUM = 32
@@ -44,6 +44,8 @@ class KeptCode(NullCache):
         """Where the code is, None where there is no place for it."""
         try:
             return _Place(self._function)
+        except NoKeyError:
+            return None
         except (RuntimeError, OSError):
             source = Path(self._function.py_func.__code__.co_filename)
             # What is typed in has no file, and no place.
@@ -109,15 +111,16 @@ class _Place(FunctionCache):
         return sig, codegen.magic_tuple(), tuple(names)
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
-        self._renew()
         # Whatever is wrong with a file, the code can be compiled.
         with contextlib.suppress(Exception):
+            self._renew()
             return super()._load_overload(sig, target_context)
         return None
 
     def _save_overload(self, sig: Any, data: Any) -> None:
-        self._renew()
-        super()._save_overload(sig, data)
+        with contextlib.suppress(NoKeyError):
+            self._renew()
+            super()._save_overload(sig, data)
 
 
 class _File(IndexDataCacheFile):
@@ -150,7 +153,7 @@ class _File(IndexDataCacheFile):
             file.write(self._checksum(content) + content)
 
     def _checksum(self, content: bytes) -> bytes:
-        """Of the content and of what it is for: two processes that write at a time may mix up the files' numbers."""
+        """Checksum of the content and its owner: two processes that write at a time may mix up the numbers of files."""
         owner = f"{self._source_stamp} {self._what}".encode()
         return hashlib.blake2b(owner + content, digest_size=CHECKSUM).digest()
 

@@ -123,7 +123,10 @@ def checked_action(action: object, size: int) -> np.ndarray:
     """
     right = f"expected {size} numbers from -1 to 1, shape ({size},)"
     try:
-        found = np.asarray(action, dtype=float)
+        given = np.asarray(action)
+        if given.dtype.kind in "SU":  # numpy would read numbers out of text
+            raise TypeError
+        found = given.astype(float)
     except (TypeError, ValueError):
         raise InputError(f"action = {plain(action)!r}: {right}.") from None
     if found.shape != (size,):

@@ -74,8 +74,8 @@ def bare_arm(
     )  # fmt: skip
 
 
-MOST_BYTES = 16 << 20
-"""Size up to which a table of excitations is read [byte]."""
+MOST_BYTES, MOST_LINES = 16 << 20, 200_000
+"""Size and lines up to which a table of excitations is read [byte, -]."""
 
 
 def read_excitations(path: str | Path) -> dict[str, Steps]:
@@ -86,6 +86,8 @@ def read_excitations(path: str | Path) -> dict[str, Steps]:
     """
     path = Path(path)
     text = decoded(path, read_bytes(path, MOST_BYTES))
+    if text.count("\n") + text.count("\r") > MOST_LINES:
+        raise InputError(f"excitations '{path}' cannot be read: expected at most {MOST_LINES} lines.")
     try:
         lines = list(csv.reader(io.StringIO(text, newline="")))
     except csv.Error as error:

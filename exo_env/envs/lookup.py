@@ -11,9 +11,10 @@ import sys
 from functools import cache
 
 import gymnasium
-from gymnasium.envs.registration import EnvSpec, parse_env_id
+from gymnasium.envs.registration import EnvSpec, load_env_creator, parse_env_id
 
 from dms_core.errors import InputError, choices
+from exo_env.envs.base_env import AssistanceEnv
 
 
 def environment_id(environment: str, say: bool = True) -> str:
@@ -34,9 +35,11 @@ def environment_id(environment: str, say: bool = True) -> str:
             raise InputError(f"environment '{environment}': module '{module}' cannot be imported: {error}.") from None
     newest = _newest(name)
     if newest is None:
+        # What a module registers has its namespace.
+        others = [other for other in gymnasium.registry if module and other.startswith(f"{name.partition('/')[0]}/")]
         raise InputError(
-            f"environment '{environment}' is not registered. There are: {choices(environments())}, and 'module:id' of "
-            "a module that registers one."
+            f"environment '{environment}' is not registered. There are: {choices([*environments(), *others])}, and "
+            "'module:id' of a module that registers one."
         )
     if newest != name and say:
         _say_once(f"note: {name} is now {newest}, which is used in its place.")
@@ -47,9 +50,17 @@ def spec_of(environment: str) -> EnvSpec:
     """What is registered under an id, or under the newest version of it.
 
     Raises:
-        InputError: as `environment_id`.
+        InputError: as `environment_id`; or the environment is not built on this package's.
     """
-    return gymnasium.spec(environment_id(environment))
+    spec = gymnasium.spec(environment_id(environment))
+    entry = spec.entry_point
+    made = load_env_creator(entry) if isinstance(entry, str) else entry
+    if isinstance(made, type) and not issubclass(made, AssistanceEnv):
+        raise InputError(
+            f"environment '{environment}' is a {made.__name__}: expected one built on AssistanceEnv of "
+            "exo_env.envs.base_env."
+        )
+    return spec
 
 
 def environments() -> list[str]:

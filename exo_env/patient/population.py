@@ -113,6 +113,11 @@ class Population(Settings):
         """Distributions as they stand in the files, those of the base included."""
         if self.base is None:
             return self.fields
+        if self.base not in shipped_populations():
+            raise InputError(
+                f"base = {shown(self.base)}: expected one of the shipped populations, which are "
+                f"{choices(shipped_populations())}; a base is no file."
+            )
         under, here = Population.shipped(self.base), {_patient_field(name) for name in self.fields}
         if under.mixture:
             raise InputError(f"base = '{self.base}' is a mixture; expected a population with fields.")

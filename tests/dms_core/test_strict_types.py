@@ -98,7 +98,9 @@ def test_messages_are_bounded():
     with pytest.raises(InputError) as caught:
         _Thing(path=["x" * 10_000] * 10_000, **{f"k{i}\n": i for i in range(1000)})
     lines = str(caught.value).splitlines()
-    assert len(lines) == 9 and lines[-1] == "_Thing: 10992 further mistakes."
+    assert len(lines) == 6 and lines[-1] == "_Thing: 9996 further mistakes."
+    # A file of another kind is known by its keys.
+    assert lines[0].startswith("_Thing: unknown keys 'k0") and " and 995 others. Allowed: " in lines[0]
     assert max(map(len, lines)) < 200 and str(caught.value).replace("\n", "").isprintable()
     with pytest.raises(InputError, match="thousands of digits"):
         _Thing(number=10**5000)

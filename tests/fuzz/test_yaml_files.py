@@ -30,8 +30,8 @@ from tests.fuzz.mutations import TOKENS, mutated
 
 MOST_SECONDS = 2.0
 """Processor time of one input."""
-MOST_CHARACTERS = 4100
-"""Of a message."""
+MOST_CHARACTERS, MOST_LINES = 1200, 6
+"""Of a line of a message, and lines: one a mistake, and one that counts the others."""
 
 
 @cache
@@ -68,7 +68,8 @@ def tried(read: Callable[[], Any]) -> None:
         read()
     except DmsError as error:
         said = str(error)
-        assert said and len(said) <= MOST_CHARACTERS, said
+        lines = said.splitlines()
+        assert said and len(lines) <= MOST_LINES and max(map(len, lines)) <= MOST_CHARACTERS, said
         assert all(c.isprintable() or c == "\n" for c in said), repr(said)
     assert time.process_time() - begun < MOST_SECONDS
 

@@ -154,6 +154,79 @@ def test_functions_as_python_are_not_what_is_run(run):
     assert found["value"] == AT_FIRST and found["said"].count("NUMBA_DISABLE_JIT is set") == 1
 
 
+OTHER_WAYS = {
+    "vectorised": ("from numba import vectorize\n\n@vectorize\ndef f(x):\n    return 2.0 * x\n", "", "f(x)"),
+    "overloaded": (
+        "from numba.extending import overload\n\ndef f(x):\n    pass\n\n@overload(f)\ndef _f(x):\n"
+        "    return lambda x: 2.0 * x\n",
+        "", "f(x)",
+    ),
+    "of modules that name each other": (
+        "import own\nfrom dms_core.compiled.jit import compiled\n\n@compiled\ndef f(x):\n    return 2.0 * x\n",
+        "import own\nimport own.inner\n", "own.inner.f(x)",
+    ),
+    "of a closure": (
+        "from dms_core.compiled.jit import compiled\n\ndef make(k):\n    @compiled\n    def g(x):\n"
+        "        return k * x\n    return g\n\nf = make(2.0)\n",
+        "", "f(x)",
+    ),
+    "written in LLVM": (
+        "from numba import types\nfrom numba.extending import intrinsic\n\n@intrinsic\ndef f(typingctx, x):\n"
+        "    def codegen(context, builder, sig, args):\n"
+        "        return builder.fmul(args[0], context.get_constant(types.float64, 2.0))\n"
+        "    return types.float64(types.float64), codegen\n",
+        "", "f(x)",
+    ),
+    "as a default": (
+        "from dms_core.compiled.jit import compiled\n\n@compiled\ndef f(x, k=2.0):\n    return k * x\n", "", "f(x)",
+    ),
+    "a constant of Python's own name": ("", "from own import profile\n", "profile.GAIN * x"),
+}  # fmt: skip
+"""How a function may come to what it does: the inner file, more of the outer one, and what that returns."""
+
+
+@pytest.mark.parametrize("way", OTHER_WAYS)
+def test_whatever_a_function_is_made_of_is_in_its_key(tmp_path, way):
+    inner, more, value = OTHER_WAYS[way]
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "__init__.py").touch()
+    (own / "profile.py").write_text("GAIN = 2.0\n")
+    (own / "inner.py").write_text(inner)
+    imported = "from own.inner import f\n" if "f(" in value and not more else ""
+    (own / "outer.py").write_text(
+        f"from dms_core.compiled.jit import compiled\n{more}{imported}\n@compiled\ndef outer(x):\n    return {value}\n"
+    )
+    env = os.environ | {"PYTHONPATH": os.pathsep.join([str(configs().parent), str(tmp_path)])}
+    call = "from own.outer import outer; print(outer(3.0), sum(outer.stats.cache_hits.values()))"
+
+    def run() -> list[str]:
+        done = subprocess.run(
+            [sys.executable, "-c", call], env=env, capture_output=True, text=True, check=False, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    assert run() == ["6.0", "0"] and run() == ["6.0", "1"]
+    for name in ("inner.py", "profile.py"):
+        (own / name).write_text((own / name).read_text().replace("2.0", "5.0"))
+    assert run() == ["15.0", "0"]
+
+
+def test_what_no_key_can_hold_is_not_kept():
+    call = (
+        "from dms_core.compiled.jit import compiled\nfrom dms_core.compiled.code_key import NoKeyError, code_key\n"
+        "class Own:\n    pass\n"
+        "own = Own()\n"
+        "@compiled\n"
+        "def f(x):\n    return x if own is None else 2.0 * x\n"
+        "try:\n    code_key(f)\nexcept NoKeyError as error:\n    print(error)\n"
+    )
+    env = os.environ | {"PYTHONPATH": str(configs().parent)}
+    done = subprocess.run([sys.executable, "-c", call], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout == "a __main__.Own\n"
+
+
 def test_a_full_disk_costs_time_only(monkeypatch, capsys):
     from numba.core.caching import IndexDataCacheFile
 

@@ -184,7 +184,7 @@ def test_own_file(tmp_path):
         ("base: healthy\nfields: {sex: {choice: [male, female], weights: [1]}}", "sex.*one number from 0"),
         ("base: healthy\nfields: {body_mass_index: 60, body_mass: 70}", "both given"),
         ("base: healthy\nfields: {body_mass_index: 90}", "body_mass_index reaches 90"),
-        ("base: nobody\nfields: {height: 1.7}", "unknown population 'nobody'.*stroke_mild"),
+        ("base: nobody\nfields: {height: 1.7}", "base = 'nobody': expected.*stroke_mild.*a base is no file"),
         ("base: mixed", "'mixed' is a mixture"),
         ("mixture: {healthy: 1, sick: 1}", "unknown population 'sick'.*stroke_mild"),
         ("mixture: {healthy: -1, stroke_mild: 2}", "mixture.*weights from 0"),
