@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -44,6 +45,8 @@ FileOut = Annotated[Path, _place("file", "FILE")]
 """Option that names a file to write."""
 FolderOut = Annotated[Path, _place("folder", "DIR")]
 """Option that names a folder to write into."""
+NARROWEST = 40
+"""Columns of the narrowest terminal that help is written for."""
 LONG_RUN = 2.0
 """Seconds after which a run shows a progress bar."""
 BAR = "{percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
@@ -68,7 +71,9 @@ def run_command(
 ) -> int:
     """Run one of the commands; a mistake of the user is one message on stderr and status 2."""
     _open_streams()
+    _widen()
     try:
+        _check_current_folder()
         _check_options(sys.argv[1:] if arguments is None else arguments)
         with _sentences_of_warnings(), _terminated_as_interrupted():
             status = tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=description, args=arguments)
@@ -101,6 +106,20 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
         elif name == "stdout" and isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _check_current_folder() -> None:
+    """Refuse to run where the current folder is gone: no relative path means anything there."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise InputError("the current folder was deleted; change to another one.") from None
+
+
+def _widen() -> None:
+    """Write help for a terminal of some width; tyro does not come to an end in one of a few columns."""
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
 
 
 def _check_stdout() -> None:

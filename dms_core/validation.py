@@ -132,7 +132,12 @@ def _without_repeats(found: list[Any]) -> list[Any]:
         if e["type"] == "extra_forbidden":
             first = unknown.setdefault(e["loc"][:-1], e)
             first.setdefault("keys", []).append(str(e["loc"][-1]))
-    return [*unknown.values(), *(e for e in found if e["type"] != "extra_forbidden")]
+    return [*unknown.values(), *(e for e in found if e["type"] != "extra_forbidden" and not _counted_wrong(e))]
+
+
+def _counted_wrong(error: Any) -> bool:
+    """Whether a list is only too short because of items that are mistakes of their own."""
+    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
 def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping[tuple, int]) -> str:
@@ -152,8 +157,7 @@ def _sentence(error: Mapping[str, Any], who: str, allowed: Any, lengths: Mapping
         return f"{who}: '{key}' is missing."
     if isinstance(error.get("ctx", {}).get("error"), DmsError):
         # A part with checks of its own (a path point, a signal) has named key and value already.
-        first, *more = error["msg"].removeprefix("Value error, ").splitlines()
-        said = f"{first.rstrip('.')}." + (f" ({len(more)} further mistakes there.)" if more else "")
+        said = " ".join(f"{line.rstrip('.')}." for line in error["msg"].removeprefix("Value error, ").splitlines())
         return f"{who}: {key}: {said}" if key else f"{who}: {said}"
     said = _right(kind, error.get("ctx", {}), error["msg"])
     return f"{who}: {key} = {shown(value)}: {said}" if key else f"{who}: {said}"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import literal, panels, save
+from exo_env.rendering.panels import drawn, literal, panels, save
 
 from .measures import MEASURES
 from .tables import heading, statistic
@@ -17,6 +17,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 """Distinct for colour-blind readers (Okabe and Ito 2008)."""
 
 
+@drawn
 def draw(path: Path, results: dict[str, Any]) -> None:
     """Draw an evaluation as PNG, by software, whole or not at all."""
     policies = results["policies"]

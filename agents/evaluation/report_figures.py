@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import legend, literal, panels, save
+from exo_env.rendering.panels import drawn, legend, literal, panels, save
 
 from .figure import COLOURS
 from .time_course import TimeCourse
@@ -34,6 +34,7 @@ class Group:
     """Evaluations of each seed."""
 
 
+@drawn
 def learning_curves(path: Path, groups: Sequence[Group]) -> None:
     """Mean over the seeds and, as a band, the lowest to the highest of them."""
     first = next((e for group in groups for curve in group.curves for e in curve), {})
@@ -69,6 +70,7 @@ def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) ->
     return steps, np.array([np.interp(steps, x, y) for x, y in columns])
 
 
+@drawn
 def pareto(path: Path, results: Mapping[str, Any]) -> None:
     """Tracking over the share of the work that the device does: low is good in both, and one costs the other.
 
@@ -170,6 +172,7 @@ ROWS = (
 )
 
 
+@drawn
 def time_courses(path: Path, columns: Mapping[str, Sequence[TimeCourse]]) -> None:
     """Patients over time, a column a patient, a colour a policy."""
     readings = {name for ones in columns.values() for one in ones for name in one.columns}

@@ -65,12 +65,22 @@ def code_key(function: Any) -> tuple[str, list[Any]]:
 
 
 @cache
-def _surroundings() -> bytes:
-    """What shapes all code: versions, numba's settings, and how this package has functions compiled."""
+def _settings() -> bytes:
+    """Versions, and settings of Python and numba that change code."""
     switches = {name: getattr(config, name, None) for name in SWITCHES}
-    said = f"{numba.__version__} {llvmlite.__version__} {np.__version__} {sys.version_info} {switches}"
-    sources = [path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))]
-    return b"\0".join([said.encode(), *sources])
+    versions = f"{numba.__version__} {llvmlite.__version__} {np.__version__} {sys.version_info}"
+    return f"{versions} {sys.flags.optimize} {switches}".encode()
+
+
+def setting_key() -> str:
+    """A short key of the settings: code for one of them does not take the place of code for another."""
+    return hashlib.sha256(_settings()).hexdigest()[:8]
+
+
+@cache
+def _surroundings() -> bytes:
+    """What shapes all code: the settings, and how this package has functions compiled."""
+    return b"\0".join([_settings(), *(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))])
 
 
 class _Walk:

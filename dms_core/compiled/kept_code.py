@@ -17,7 +17,7 @@ from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
-from dms_core.compiled.code_key import NoKeyError, code_key
+from dms_core.compiled.code_key import NoKeyError, code_key, setting_key
 from dms_core.compiled.compilation import write
 
 CHECKSUM = 32
@@ -99,7 +99,7 @@ class _Place(FunctionCache):
                 keep(function)
         # A function that makes functions gives all of them one name and one line.
         which = f".{key[:16]}" if self._function.py_func.__closure__ else ""
-        self._cache_file = _File(self._cache_path, f"{self._impl.filename_base}.keyed{which}", key)
+        self._cache_file = _File(self._cache_path, f"{self._impl.filename_base}.{setting_key()}{which}", key)
 
     @property
     def fits(self) -> bool:

@@ -53,7 +53,13 @@ def begin(work: Sequence[str], last: Any) -> None:
             [sys.executable, "-c", COMMAND, *work],
             env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
         )  # fmt: skip
-        atexit.register(_process.kill)
+        atexit.register(_end, _process)
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End the second process, which leaves nothing behind."""
+    process.kill()
+    process.communicate()
 
 
 def wait_for(work: str) -> None:

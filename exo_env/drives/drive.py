@@ -27,7 +27,7 @@ from dms_core.errors import InputError
 from dms_core.kernels import floats, inner, ints, matrix
 from dms_core.model import Constant, Input
 from dms_core.model.element import Force
-from dms_core.validation import plain
+from dms_core.validation import shown
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.settings import Settings
@@ -115,22 +115,38 @@ def still_apart(w):
     return start_apart(w) * (1.0 - s * s * s * (10.0 + s * (6.0 * s - 15.0)))
 
 
+def as_numbers(values: object) -> np.ndarray:
+    """Real numbers as floats, in the order of C.
+
+    Raises:
+        TypeError, ValueError: they are something else, or no table of equally long rows.
+        OverflowError: one is too large for a float.
+    """
+    found = np.asarray(values)
+    hidden = np.ma.getmaskarray(values).any() if isinstance(values, np.ma.MaskedArray) else False
+    # numpy would read numbers out of texts and dates, and drop what is imaginary or masked.
+    if hidden or found.dtype.kind not in "biufO" or found.dtype == object and not all(map(_real, found.flat)):
+        raise TypeError("no real numbers")
+    return np.asarray(found, dtype=float, order="C")
+
+
+def _real(value: object) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating)
+
+
 def checked_action(action: object, size: int) -> np.ndarray:
     """An action as finite numbers, clipped to [-1, 1], shape (size,).
 
     Raises:
-        InputError: it has another shape, or a number is not finite.
+        InputError: it is something else, has another shape, or a number is not finite.
     """
     right = f"expected {size} numbers from -1 to 1, shape ({size},)"
     try:
-        given = np.asarray(action)
-        if given.dtype.kind in "SU":  # numpy would read numbers out of text
-            raise TypeError
-        found = given.astype(float)
-    except (TypeError, ValueError):
-        raise InputError(f"action = {plain(action)!r}: {right}.") from None
+        found = as_numbers(action)
+    except (TypeError, ValueError, OverflowError, RuntimeError):
+        raise InputError(f"action = {shown(action)}: {right}.") from None
     if found.shape != (size,):
         raise InputError(f"action has shape {found.shape}: {right}.")
     if not np.isfinite(found).all():
-        raise InputError(f"action = {found.tolist()}: expected finite numbers (they are clipped to -1 to 1).")
+        raise InputError(f"action = {shown(found)}: expected finite numbers (they are clipped to -1 to 1).")
     return np.clip(found, -1.0, 1.0)

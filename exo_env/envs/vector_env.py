@@ -16,7 +16,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from dms_core.errors import InputError, SimulationError, choices
-from dms_core.validation import plain
+from dms_core.validation import plain, shown
+from exo_env.drives.drive import as_numbers
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.copies import WithSpec
 from exo_env.envs.settings import check_whole
@@ -264,7 +265,12 @@ class AssistanceVectorEnv(WithSpec, VectorEnv):
 
     def _checked(self, actions: Any) -> np.ndarray:
         """The actions, clipped to the box; refuses those that are not finite or of another shape."""
-        used = np.ascontiguousarray(actions, float)  # any other order would be compiled for anew
+        try:
+            used = as_numbers(actions)  # any other order would be compiled for anew
+        except (TypeError, ValueError, OverflowError, RuntimeError):
+            raise InputError(
+                f"actions = {shown(actions)}: expected numbers, shape {self.action_space.shape}."
+            ) from None
         if used.shape != self.action_space.shape:
             raise InputError(f"actions have shape {used.shape}: expected {self.action_space.shape}.")
         if not np.isfinite(used).all():

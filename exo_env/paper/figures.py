@@ -12,7 +12,7 @@ import numpy as np
 from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.paper.scenarios import ScenarioRun
 from exo_env.paper.summary import SHOWN_MUSCLES, SHOWN_ROPES, magnitude
-from exo_env.rendering.panels import legend, panels, save
+from exo_env.rendering.panels import drawn, legend, panels, save
 
 if TYPE_CHECKING:
     from exo_env.paper.tuning import Gains
@@ -80,6 +80,7 @@ def _sensor(name: str, factor: float = 1.0) -> Curve:
     return lambda run: factor * run.values[name]
 
 
+@drawn
 def step_response(path: Path, times: np.ndarray, angle: np.ndarray, target: float, title: str, gains: Gains) -> Path:
     """Figs. 6 and 7: hinge angle after a step.
 
@@ -172,6 +173,7 @@ def scenario_figures(folder: Path, runs: Sequence[ScenarioRun], labels: Sequence
     return sentences
 
 
+@drawn
 def _trajectories(path: Path, lines: Sequence[Line]) -> None:
     """Fig. 9: angles, and below them the errors that the eye cannot see there."""
     figure, (above, below) = _panels(2)
@@ -185,6 +187,7 @@ def _trajectories(path: Path, lines: Sequence[Line]) -> None:
     save(figure, path)
 
 
+@drawn
 def _stacked(path: Path, declared: Figure, lines: Sequence[Line]) -> None:
     """The quantities of a figure, one below the other."""
     figure, axes = _panels(len(declared.panels))

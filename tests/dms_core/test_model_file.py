@@ -149,7 +149,7 @@ MISTAKES = {
     ),
     "wrong part": (
         ROD + "forces:\n  - {kind: rope_force, name: r, tension: 1, path: [{point: [0, 0, 0]}, {bdy: rod}]}\n",
-        r"rope_force 'r': path.1: PathPoint: 'point' is missing\.\nPathPoint: unknown key 'bdy'",
+        r"rope_force 'r': path.1: PathPoint: unknown key 'bdy'\. Allowed: .* PathPoint: 'point' is missing\.$",
     ),
     "wrong signal": (
         ROD + "inputs:\n  - {name: u, signal: {kind: steps, times: [0, 1], values: [1]}}\n",

@@ -49,3 +49,19 @@ def test_signs_that_an_encoding_does_not_have_are_replaced(tmp_path, encoding):
     (tmp_path / "model.yaml").write_text(MODEL, encoding="utf-8")
     done = shell("PYTHON -m dms_core check model.yaml", tmp_path, PYTHONIOENCODING=encoding, LC_ALL="C", PYTHONUTF8="0")
     assert done.returncode == 0 and done.stderr == "" and "?" in done.stdout
+
+
+@pytest.mark.parametrize("columns", ["1", "2", "5", "9"])
+def test_help_comes_to_an_end_in_a_narrow_terminal(tmp_path, columns):
+    done = shell("timeout 60 PYTHON -m dms_core run --help", tmp_path, COLUMNS=columns)
+    assert done.returncode == 0 and "--t-end" in done.stdout
+
+
+def test_a_deleted_folder_is_named(tmp_path):
+    done = shell("mkdir gone && cd gone && rmdir ../gone && PYTHON -m dms_core schema --out page.md", tmp_path)
+    assert done.returncode == 2 and done.stderr == "error: the current folder was deleted; change to another one.\n"
+
+
+def test_a_dash_is_no_file(tmp_path):
+    done = shell("PYTHON -m dms_core schema --out -", tmp_path)
+    assert done.returncode == 2 and "standard output is /dev/stdout" in done.stderr and not list(tmp_path.iterdir())

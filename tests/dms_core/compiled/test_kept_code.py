@@ -136,7 +136,10 @@ def test_code_of_one_function_is_not_taken_for_another(run):
 @pytest.mark.parametrize("run", ["NUMBA_CACHE_DIR"], indirect=True)
 def test_settings_of_numba_are_in_the_key(run):
     run()
-    assert run(NUMBA_OPT="1")["hits"] == 0
+    for other in ({"NUMBA_OPT": "1"}, {"PYTHONOPTIMIZE": "1"}):
+        assert run(**other)["hits"] == 0
+        # Code for one setting does not take the place of that for another.
+        assert run(**other)["hits"] == 1 and run()["hits"] == 1
 
 
 @pytest.mark.parametrize("run", ["beside the files"], indirect=True)

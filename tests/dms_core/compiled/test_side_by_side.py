@@ -29,7 +29,7 @@ def fresh(monkeypatch, tmp_path):
     monkeypatch.setattr(side_by_side, "_process", None)
     monkeypatch.setattr(side_by_side, "_done", set())
     monkeypatch.setattr(side_by_side, "_processors", lambda: 2)
-    monkeypatch.setattr(side_by_side.atexit, "register", lambda function: None)
+    monkeypatch.setattr(side_by_side.atexit, "register", lambda *function: None)
     (tmp_path / "pieces.py").write_text(WORK)
     monkeypatch.syspath_prepend(str(tmp_path))
     return SimpleNamespace(_cache=SimpleNamespace(cache_path=str(tmp_path), fits=False))

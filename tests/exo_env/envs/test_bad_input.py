@@ -202,3 +202,36 @@ def test_seeds_of_a_batch(seed, complaint):
 def test_numbers_of_a_device_in_another_unit_are_refused(device, complaint):
     with pytest.raises(InputError, match=complaint):
         ElbowLiftEnv(exoskeleton=device)
+
+
+NO_NUMBERS = {
+    "texts": lambda shape: np.full(shape, "0.1"),
+    "dates": lambda shape: np.full(shape, "2020-01-01", dtype="M8[D]"),
+    "masked": lambda shape: np.ma.masked_array(np.zeros(shape), np.ones(shape, bool)),
+    "complex": lambda shape: np.full(shape, 0.1 + 1j),
+    "too large": lambda shape: np.full(shape, 10**400, dtype=object).tolist(),
+    "nothing": lambda shape: np.full(shape, None).tolist(),
+    "rows of other lengths": lambda shape: [[0.1], *np.zeros(shape).tolist()],
+}
+"""What NumPy would read numbers out of, or refuse in its own words."""
+
+
+@pytest.mark.parametrize("kind", NO_NUMBERS)
+def test_actions_that_are_no_numbers(env, kind):
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="^action .*expected 2 numbers"):
+        env.step(NO_NUMBERS[kind]((2,)))
+    worlds = ElbowLiftVectorEnv(2)
+    worlds.reset(seed=0)
+    with pytest.raises(InputError, match="^actions .*expected"):
+        worlds.step(NO_NUMBERS[kind]((2, 2)))
+    worlds.close()
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.float16, np.int8, bool, ">f8", "g", object])
+def test_numbers_of_all_kinds_are_an_action(env, kind):
+    env.reset(seed=0)
+    given = kind([1, 0]) if kind in (list, tuple) else np.array([1, 0], dtype=kind)
+    found = env.step(given)[0]
+    env.reset(seed=0)
+    assert np.array_equal(found, env.step(np.array([1.0, 0.0]))[0])
