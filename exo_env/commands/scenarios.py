@@ -67,9 +67,14 @@ def scenarios(
         titles = [s.title for s in declared]
         labels = [f"{k if of_the_paper else names[k - 1]}: {title}" for k, title in enumerate(titles, 1)]
         left_out = _draw(out, runs, labels, ecosystem)
-    statements = [*_statements(orderings, of_the_paper), *left_out]
+    statements = [*_statements(orderings, of_the_paper), *left_out, *_flags(names, runs)]
     print("\n".join([*_table(named), "", *statements, f"written: {outputs.where(out)}"]))
     return FAILED_RUN if outputs.failed else 0
+
+
+def _flags(names: Sequence[str], runs: Sequence[ScenarioRun]) -> list[str]:
+    """A line for each range that something left, such as a rope that pushes."""
+    return [f"  note   {name}: {flag.sentence}" for name, r in zip(names, runs, strict=True) for flag in r.trajectory.flags]
 
 
 def _declared(exercise: Path | None, files: Sequence[Path]) -> tuple[Exercise, list[str], list[Scenario]]:

@@ -52,6 +52,14 @@ def test_own_scenarios_on_an_own_exercise(tmp_path, capsys):
     assert "none is judged here" in printed and "left out" not in printed
 
 
+def test_a_rope_that_pushes_is_told(tmp_path, capsys):
+    """A weight of 10.00 kg, its point forgotten: nobody holds it, and the arm is thrown about."""
+    heavy = written(tmp_path / "heavy.yaml", {**SCENARIO, "weight": 1000.0})
+    exercise = written(tmp_path / "lift.yaml", EXERCISE)
+    assert main(["scenarios", "--out", str(tmp_path / "out"), "--exercise", exercise, "--scenarios", heavy]) == 0
+    assert "note   heavy: rope_length 'gym_rope': its tension was negative" in capsys.readouterr().out
+
+
 def test_figures_without_anything_to_show_are_left_out_with_a_sentence(tmp_path, capsys):
     exercise = written(tmp_path / "lift.yaml", EXERCISE)
     limp = written(tmp_path / "limp.yaml", {**SCENARIO, "maximum_activation": 0.0})
