@@ -60,8 +60,6 @@ def evaluate(
     """
     if not policy_names:
         raise InputError("--policy: expected one or more names.")
-    if len(set(loads)) < len(loads):
-        raise InputError(f"--loads {' '.join(map(str, loads))}: expected different loads.")
     # First: it may be what registers the environment that a policy was trained in.
     environment_id(environment)
     used = different_policies(policy_names)
