@@ -23,7 +23,7 @@ from ..evaluation.tables import heading, left_out_lines, short_table, statistic,
 from ..policies.baselines import POLICIES
 from ..policies.learned import find_policy, shipped_policies
 from ..policies.policy import Policy
-from .options import device_settings, repeated
+from .options import device_settings, different_policies, repeated
 
 EVALUATION = "evaluation.json"
 
@@ -58,11 +58,11 @@ def evaluate(
         address: of a Ray cluster; a local one is started where it is not given.
         overwrite: replace files in the folder that this command did not write.
     """
-    if len(set(policy_names)) < max(len(policy_names), 1):
-        raise InputError(f"--policy {' '.join(policy_names)}: expected one or more different names.")
+    if not policy_names:
+        raise InputError("--policy: expected one or more names.")
     # First: it may be what registers the environment that a policy was trained in.
     environment_id(environment)
-    used = [find_policy(name) for name in policy_names]
+    used = different_policies(policy_names)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     plan = Plan(population, patients, seed, loads, environment, settings)
     inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]

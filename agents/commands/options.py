@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
 from dms_core.json_text import brief, parse_json
 
-from ..policies.learned import repetitions_of
+from ..checkpoint import Store
+from ..policies.learned import DESCRIPTION, SHIPPED, LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from ..policies.policy import Policy
+
+
+def different_policies(names: Sequence[str]) -> list[Policy]:
+    """Policies by what a user calls them (see `find_policy`), no two of them the same under two names.
+
+    Raises:
+        InputError: there is none of a name, or two are the same.
+    """
+    found: dict[Any, str] = {}
+    policies = []
+    for name in names:
+        policies.append(find_policy(name))
+        first = found.setdefault(_identity(name, policies[-1]), name)
+        if len(found) < len(policies):
+            raise InputError(f"policies '{first}' and '{name}' are the same one: expected different policies.")
+    return policies
+
+
+def _identity(name: str, one: Policy) -> Any:
+    """What a policy is under any name: its class, or the folder that a trained one was read from."""
+    if type(one) is not LearnedPolicy:
+        return type(one)
+    folder = SHIPPED / name if name in shipped_policies() else Path(name)
+    return (folder if (folder / DESCRIPTION).is_file() else Store(folder / "best").latest()).resolve()
 
 
 def device_settings(exoskeleton: str | None) -> dict[str, Any]:

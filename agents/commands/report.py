@@ -24,7 +24,7 @@ from ..policies.baselines import POLICIES
 from ..policies.learned import find_policy, shipped_policies
 from ..policies.policy import Policy
 from ..training.run_folder import read_record
-from .options import device_settings, repeated
+from .options import device_settings, different_policies, repeated
 from .report_input import collected, grouped
 
 
@@ -123,9 +123,9 @@ def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
 def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], trainings: Mapping[Path, Any]) -> list[Policy]:
     """The two policies to show over time."""
     if names:
-        if len(set(names)) != 2:
+        if len(names) != 2:
             raise InputError(f"--policies {' '.join(names)}: expected two different names.")
-        return [find_policy(name) for name in names]
+        return different_policies(names)
     evaluated = evaluations[0]["policies"] if evaluations else {}
     ranked = sorted(evaluated, key=lambda n: evaluated[n]["summary"]["return"]["value"], reverse=True)
     learned = [n for n in ranked if n not in POLICIES] + [str(path) for path, curve in trainings.items() if curve]

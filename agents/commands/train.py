@@ -26,7 +26,7 @@ BAR = "{percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt} steps, {rate_fmt}, {ela
 
 def train(
     config: Path | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
     out: FolderOut | None = None,
     resume: Path | None = None,
@@ -36,11 +36,12 @@ def train(
 
     Args:
         config: YAML file in the format of rl_zoo3, as in configs/agents.
-        seed: decides all that is random.
+        seed: decides all that is random; 0 where it is not given.
         changes: values that replace those of the configuration, for example n_timesteps=1e5 policy_kwargs.net_arch=[32]
             training.eval_every=1e4. A value is YAML 1.2, so that 1e5 is a number, 010 is 10 and yes is text.
         out: folder of the training, empty or new; out/training/ALGORITHM_SEED where it is not given.
-        resume: folder of a training to go on with; of the values only n_timesteps and training.* may then be changed.
+        resume: folder of a training to go on with; of the values only n_timesteps, training.eval_every,
+            training.save_every, training.threads and training.device may then be changed.
         environment: id of the section of the configuration to take; module:ID where another package registers it.
     """
     require_training()
@@ -49,10 +50,10 @@ def train(
     if environment is not None:
         environment_id(environment)
 
-    with _stopping() as stop:
-        folder, used, seed = _begun(config, seed, changes, out, resume, environment)
+    begun = _begun(config, seed, changes, out, resume, environment)
+    with _stopping() as stop, begun as (folder, used, seed):
         try:
-            with folder.locked(), _bar(used.n_timesteps) as report:
+            with _bar(used.n_timesteps) as report:
                 run = TrainingRun(folder, used, seed, report, judged, stop)
                 for line in _outlook(run.steps, run.end, used.n_timesteps):
                     tqdm.write(line)
@@ -80,32 +81,48 @@ def _outlook(steps: int, end: int, planned: int) -> Iterator[str]:
         yield f"whole rounds end after {end} steps, not {planned}"
 
 
+@contextlib.contextmanager
 def _begun(
-    config: Path | None, seed: int, changes: tuple[str, ...], out: Path | None, resume: Path | None,
+    config: Path | None, seed: int | None, changes: tuple[str, ...], out: Path | None, resume: Path | None,
     environment: str | None,
-) -> Any:  # fmt: skip
-    """Folder, configuration and seed of a new training or of one to go on with."""
+) -> Iterator[Any]:  # fmt: skip
+    """Folder, configuration and seed of a training, which no other process can begin or go on with meanwhile."""
     from ..training.run_folder import RunFolder
 
     if resume is not None:
         if config is not None or out is not None:
             raise InputError("--resume takes configuration and folder from the training; leave out --config and --out.")
-        fixed = [c for c in changes if not c.startswith(("n_timesteps=", "training."))]
-        if fixed:
-            raise InputError(
-                f"--set {fixed[0]}: only n_timesteps and training.* may change in a training that goes on."
-            )
         folder = RunFolder(resume)
-        return folder, *folder.go_on(changes)
+        # First: what is no training gets no lock.
+        _check_known(resume, seed, environment)
+        with folder.locked():
+            yield folder, *folder.go_on(changes)
+        return
     if config is None:
         raise InputError(f"expected --config FILE or --resume DIR; there are files in {configs() / 'agents'}.")
+    seed = 0 if seed is None else seed
     if seed < 0:
         raise InputError(f"seed = {seed}: expected a whole number from 0.")
     # A mistake shall not leave a folder behind.
     used = checked_config(config, changes, environment)
     folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
-    folder.begin(used, seed)
-    return folder, used, seed
+    folder.check_new()
+    with folder.locked():
+        folder.begin(used, seed)
+        yield folder, used, seed
+
+
+def _check_known(folder: Path, seed: int | None, environment: str | None) -> None:
+    """Refuse another seed or environment than those of a training that is to go on."""
+    from ..training.records import read_record
+
+    record = read_record(folder)
+    if seed is not None and seed != record["seed"]:
+        raise InputError(f"--seed {seed}: the training in '{folder}' has seed {record['seed']}, which may not change.")
+    if environment is not None and environment_id(environment) != environment_id(record["environment"]):
+        raise InputError(
+            f"--env {environment}: the training in '{folder}' is in {record['environment']}, which may not change."
+        )
 
 
 @contextlib.contextmanager

@@ -20,9 +20,9 @@ from exo_env.patient.population import population
 
 from ..environment import ENVIRONMENT, PROGRAM, environment_id
 from ..evaluation.episode import world_of
-from ..policies.learned import find_policy, shipped_policies
+from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
-from .options import device_settings, repeated
+from .options import device_settings, different_policies, repeated
 
 BAND, FONT, MOST = 44, 18, 4
 """Height of the titles and size of their letters [pixel], and policies that fit side by side."""
@@ -55,12 +55,12 @@ def video(
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
         overwrite: replace a file of this name that this command did not write.
     """
-    if not 1 <= len(set(policy_names)) == len(policy_names) <= MOST:
-        raise InputError(f"--policy {' '.join(policy_names)}: expected one to {MOST} different names.")
+    if not 1 <= len(policy_names) <= MOST:
+        raise InputError(f"--policy: expected one to {MOST} names, got {len(policy_names)}.")
     if out.suffix not in (".mp4", ".gif"):
         raise InputError(f"output '{out}': expected a name that ends in .mp4 or .gif.")
     environment_id(environment)
-    used = [find_policy(name) for name in policy_names]
+    used = different_policies(policy_names)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     out = _possible(out)
     inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]

@@ -44,13 +44,16 @@ def train_share(content: dict[str, Any], seed: int, folder: str) -> dict[str, An
 
     place = RunFolder(Path(folder))
     config = Config.of(content, "")
-    if (place.path / RECORD).is_file():
-        begun, known = place.go_on(())
-        if begun.content() != config.content() or known != seed:
-            raise InputError(f"'{folder}' holds a training of another configuration; choose another --out.")
-    else:
-        place.begin(config, seed)
+    known = (place.path / RECORD).is_file()
+    if not known:
+        place.check_new()
     with place.locked():
+        if not known:
+            place.begin(config, seed)
+        else:
+            begun, used = place.go_on(())
+            if begun.content() != config.content() or used != seed:
+                raise InputError(f"'{folder}' holds a training of another configuration; choose another --out.")
         run = TrainingRun(place, config, seed, lambda steps, evaluation: None, judged)
         run.run()
     return max(run.evaluations, key=lambda e: e["return"])

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import InputError
+from dms_core.validation import shown
 from exo_env.patient.ability import ABLE
 from exo_env.patient.population import Source, population
 
@@ -61,6 +62,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         check_numbers(self.patients, self.seed)
+        if len(set(self.loads)) < len(self.loads):
+            # A load that stands twice would count twice in a patient's mean.
+            raise InputError(f"loads = {shown(list(self.loads))}: expected each load once.")
         source = population(self.population)
         object.__setattr__(self, "id", environment_id(self.environment))
         object.__setattr__(self, "title", source.title)

@@ -1,6 +1,6 @@
 """What the JSON files of a training have to hold, and their readers.
 
-run.json                    environment, algorithm, seed and the starts
+run.json                    environment, algorithm, seed, what may not change (fixed_values.py), and the starts
 evaluations.json            the learning curve, a point an evaluation
 checkpoints/*/state.json    counters that a training goes on from
 best/*/state.json           the point of the learning curve at which the policy was best
@@ -8,6 +8,7 @@ best/*/state.json           the point of the learning curve at which the policy 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +17,8 @@ from pydantic import AfterValidator, ConfigDict, FailFast, Field
 from dms_core.errors import InputError
 from dms_core.json_text import Each, checked, read_json
 from dms_core.validation import Checked
+
+from ..policies.learned import fingerprint
 
 RECORD, EVALUATIONS, STATE = "run.json", "evaluations.json", "state.json"
 Count = Annotated[int, Field(strict=True, ge=0)]
@@ -29,6 +32,8 @@ class Record(Checked):
     algorithm: str
     seed: Count
     sessions: Annotated[list[dict[str, Any]], FailFast()]
+    fixed: dict[str, Any] | None = Field(default=None, description="may not change; older trainings have none")
+    sha256: str = Field(default="", description="of all but the starts")
 
 
 class CurvePoint(Checked):
@@ -71,13 +76,23 @@ def read_record(folder: Path) -> dict[str, Any]:
     """run.json of a training's folder.
 
     Raises:
-        InputError: there is none, or it is not whole.
+        InputError: there is none, it is not whole, or it was changed by hand.
     """
     if not (folder / RECORD).is_file():
         raise InputError(f"'{folder}' is not the folder of a training: it holds no {RECORD}.")
     content = read_json(folder / RECORD)
-    checked(Record, content, f"file '{folder / RECORD}'")
+    record = checked(Record, content, f"file '{folder / RECORD}'")
+    if (record.fixed is not None or record.sha256) and record.sha256 != seal(content):
+        raise InputError(
+            f"file '{folder / RECORD}' was changed: its SHA-256 is not the one that it holds. Undo the change, or "
+            "begin a new training."
+        )
     return content
+
+
+def seal(record: Mapping[str, Any]) -> str:
+    """SHA-256 of all of run.json but the starts, which each one adds to."""
+    return fingerprint({key: value for key, value in record.items() if key != "sessions"})
 
 
 def read_curve(folder: Path) -> list[dict[str, Any]]:

@@ -1,6 +1,6 @@
 """The folder of a training: what was run, with what, how far it came.
 
-run.json          seed, command lines, versions, git revision
+run.json          seed, values that may not change, command lines, versions, git revision
 config.yml        the configuration, overrides included; rl_zoo3 reads it too
 evaluations.json  the learning curve
 checkpoints/      what the training goes on from
@@ -28,9 +28,12 @@ from ..checkpoint import Store
 from ..environment import environment_id
 from ..provenance import revision, versions
 from .config import Config
+from .fixed_values import check_fixed, check_overrides, fixed_values
 from .records import EVALUATIONS as EVALUATIONS
 from .records import RECORD as RECORD
 from .records import read_record as read_record
+from .records import seal
+from .usable import checked_config
 
 CONFIG, LOCK = "config.yml", ".lock"
 
@@ -46,8 +49,8 @@ class RunFolder:
         self.path = path
         self.checkpoints, self.best = Store(path / "checkpoints", keep=2), Store(path / "best")
 
-    def begin(self, config: Config, seed: int) -> None:
-        """A new training.
+    def check_new(self) -> None:
+        """Make the folder of a new training.
 
         Raises:
             InputError: the folder is in use, or is a file.
@@ -59,22 +62,33 @@ class RunFolder:
             hint = f"go on with --resume {self.path}, or" if (self.path / RECORD).is_file() else ""
             raise InputError(f"output '{self.path}' is not empty; {hint} choose another --out.".replace("  ", " "))
         check_writable(self.path / RECORD)
+
+    def begin(self, config: Config, seed: int) -> None:
+        """A new training; to be called while the folder is locked.
+
+        Raises:
+            InputError: the folder is in use, or is a file.
+        """
+        self.check_new()
         self.write_config(config)
         record = {
             "environment": config.environment, "algorithm": config.training.algorithm, "seed": seed,
-            "sessions": [_session()],
+            "fixed": fixed_values(config),
         }  # fmt: skip
-        write_json(self.path / RECORD, record)
+        write_json(self.path / RECORD, record | {"sha256": seal(record), "sessions": [_session()]})
 
     def go_on(self, overrides: tuple[str, ...]) -> tuple[Config, int]:
-        """Configuration and seed of a training that was begun; what goes on is recorded.
+        """Configuration and seed of a training that was begun; what goes on is recorded, while the folder is locked.
 
         Raises:
-            InputError: the folder holds no training, or one of another environment.
+            InputError: the folder holds no training or one of another environment, a value is changed that may not
+                change, or one that may is not usable. Then nothing is written.
         """
+        check_overrides(overrides)
         record = read_record(self.path)
-        environment = environment_id(record["environment"])
-        config = Config.read(self.path / CONFIG, overrides, environment)
+        config = checked_config(self.path / CONFIG, overrides, environment_id(record["environment"]))
+        if record.get("fixed") is not None:
+            check_fixed(record["fixed"], config, self.path)
         if overrides:
             self.write_config(config)
         record["sessions"].append(_session())

@@ -66,7 +66,8 @@ def test_band_tells_what_ended_an_episode():
     "said, name, policies",
     [
         ("expected a name that ends in .mp4 or .gif", "a.avi", ["pid"]),
-        ("expected one to 4 different names", "a.gif", ["pid", "pid"]),
+        ("policies 'pid' and 'pid' are the same one", "a.gif", ["pid", "pid"]),
+        ("expected one to 4 names, got 5", "a.gif", ["pid"] * 5),
         ("unknown policy 'nobody'", "a.gif", ["nobody"]),
     ],
 )
