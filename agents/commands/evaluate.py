@@ -11,7 +11,7 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
-from dms_core.errors import DmsError, InputError, Stopped
+from dms_core.errors import DmsError, InputError, Stopped, counted
 from dms_core.output_file import write_json, write_text
 from dms_core.outputs import Outputs, partial
 from exo_env.rendering.panels import require_matplotlib
@@ -56,7 +56,7 @@ def evaluate(
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
         workers: 'ray' shares the episodes out, with the same results to the last bit.
         address: of a Ray cluster; a local one is started where it is not given.
-        overwrite: replace files in the folder that this command did not write.
+        overwrite: replace files in the folder that others wrote or changed.
     """
     if len(set(policy_names)) < max(len(policy_names), 1):
         raise InputError(f"--policy {' '.join(policy_names)}: expected one or more different names.")
@@ -67,24 +67,28 @@ def evaluate(
     plan = Plan(population, patients, seed, loads, environment, settings)
     inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
     with Outputs("evaluate", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
-        with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
-
-            def progress(name: str) -> None:
-                bar.set_description(name)
-                bar.update()
-
-            if workers == "ray":
-                from ..distributed.shared_evaluation import shared_out
-
-                results = shared_out(used, plan, address=address, progress=progress)
-            else:
-                results = results_of(used, _episodes(used, plan, progress, out / EVALUATION), plan)
+        results = _results(used, plan, out / EVALUATION, workers, address)
         write_json(out / EVALUATION, results)
         write_text(out / "evaluation.md", "\n".join(whole_table(results)))
         _draw(out / "evaluation.png", results)
     print("\n".join([heading(results), statistic(results), *left_out_lines(results), "", short_table(results), ""]))
     print(f"written: {outputs.where(out)} (all measures: evaluation.md, all episodes: {EVALUATION})")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _results(used: Sequence[Policy], plan: Plan, path: Path, workers: str, address: str | None) -> dict[str, Any]:
+    """Results of all policies, with a bar over their episodes; see `_episodes`."""
+    with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
+
+        def progress(name: str) -> None:
+            bar.set_description(name)
+            bar.update()
+
+        if workers == "ray":
+            from ..distributed.shared_evaluation import shared_out
+
+            return shared_out(used, plan, address=address, progress=progress)
+        return results_of(used, _episodes(used, plan, progress, path), plan)
 
 
 def _episodes(
@@ -120,7 +124,8 @@ def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, 
     part = partial(path)
     write_json(part, results_of(used[: len(whole)], whole, plan))
     names = ", ".join(one.name for one in used[: len(whole)])
-    return f"{plan.patients} patients with {names} are in '{part}'."
+    verb = "is" if plan.patients == 1 else "are"
+    return f"{counted(plan.patients, 'patient')} with {names} {verb} in '{part}'."
 
 
 def _draw(path: Path, results: dict[str, Any]) -> None:

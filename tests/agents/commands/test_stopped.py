@@ -59,7 +59,17 @@ def test_an_evaluation_keeps_whole_patients_of_its_first_policy(stopped_at, tmp_
     assert main([*EVALUATE, "--loads", "1", "2", "--out", str(tmp_path)]) == 130
     found = json.loads((tmp_path / "evaluation.partial.json").read_text())
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 2
-    assert "1 patients with none" in capsys.readouterr().err
+    assert "stopped: 1 patient with none is in " in capsys.readouterr().err
+
+
+def test_a_part_outlives_the_next_evaluations(stopped_at, tmp_path):
+    stopped_at("agents.evaluation.evaluate.episode", 2)
+    assert main(["evaluate", "--policy", "none", "--patients", "2", "--out", str(tmp_path)]) == 130
+    part = tmp_path / "evaluation.partial.json"
+    before = part.read_bytes()
+    for _ in range(2):
+        assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path)]) == 0
+    assert part.read_bytes() == before
 
 
 def test_an_evaluation_that_did_nothing_says_so(stopped_at, tmp_path, capsys):

@@ -12,10 +12,7 @@ import pytest
 
 from dms_core import output_place
 from dms_core.errors import DmsError, InputError, Stopped
-from dms_core.output_file import (
-    write_bytes,
-    write_text,
-)
+from dms_core.output_file import write_bytes, write_file, write_text
 from dms_core.output_place import PREFIX, check_folder, check_writable
 from dms_core.outputs import MANIFEST, OutputFile, Outputs, partial
 
@@ -100,6 +97,23 @@ class TestWholeFile:
         finally:
             os.umask(before)
         assert stat.S_IMODE((tmp_path / "file").stat().st_mode) == 0o640
+
+    def test_the_umask_is_never_touched(self, tmp_path, monkeypatch):
+        # Another thread would make files that all may write.
+        monkeypatch.setattr(os, "umask", lambda mask: pytest.fail("the umask was set"))
+        check_writable(tmp_path / "file")
+        write_text(tmp_path / "file", "new")
+
+    def test_what_replaces_a_private_file_is_private_while_it_is_written(self, tmp_path):
+        path, modes = tmp_path / "file", []
+        path.write_text("old")
+        path.chmod(0o600)
+
+        def content(file):
+            modes.append(stat.S_IMODE(os.fstat(file.fileno()).st_mode))
+
+        write_file(path, content)
+        assert modes == [0o600]
 
     @root_only
     def test_the_owner_is_kept(self, tmp_path):
@@ -188,7 +202,7 @@ class TestWholeFile:
 
 def outputs(*files, **options):
     """Outputs of a command `test`, files by their options."""
-    return Outputs("test", files=[OutputFile(f"--{k}", path, b"^mark") for k, path in enumerate(files)], **options)
+    return Outputs("test", files=[OutputFile(f"--{k}", path) for k, path in enumerate(files)], **options)
 
 
 class TestFiles:
@@ -223,16 +237,67 @@ class TestFiles:
     def test_two_outputs_may_both_be_thrown_away(self):
         outputs(Path("/dev/null"), Path("/dev/null"))
 
-    def test_what_others_wrote_needs_the_flag(self, tmp_path):
+    @pytest.mark.parametrize("content", ["precious", '{\n  "result": "SUCCESS",\n  "mine": 1}', "time_s, mine q.x"])
+    def test_a_file_that_exists_needs_the_flag_whatever_it_holds(self, tmp_path, content):
         path = tmp_path / "file"
-        path.write_text("precious")
-        with pytest.raises(InputError, match=r"was not written by `test`; .* --overwrite"):
+        path.write_text(content)
+        with pytest.raises(InputError, match=r"--0 '.*file' exists; choose another name, or give --overwrite"):
             outputs(path)
+        assert path.read_text() == content
         with outputs(path, overwrite=True):
-            write_text(path, "mark: new")
-        with outputs(path):
-            write_text(path, "mark: newer")
-        assert path.read_text() == "mark: newer"
+            write_text(path, "new")
+        # Nor is what the same command wrote a file to lose.
+        with pytest.raises(InputError, match="--overwrite"):
+            outputs(path)
+        assert path.read_text() == "new"
+
+    def test_a_file_that_came_meanwhile_is_not_replaced(self, tmp_path, elsewhere, capsys):
+        path = tmp_path / "file"
+        with outputs(path) as done:
+            path.write_text("precious")
+            write_text(path, "result")
+        assert path.read_text() == "precious" and (done.where(path) / "file").read_text() == "result"
+        assert "exists and was not written by `test`" in capsys.readouterr().err
+
+    def test_a_file_that_comes_while_it_is_written_is_not_replaced(self, tmp_path, elsewhere):
+        path = tmp_path / "file"
+
+        def content(file):
+            if not path.exists():
+                path.write_text("precious")
+            file.write(b"result")
+
+        with outputs(path) as done:
+            write_file(path, content)
+        assert path.read_text() == "precious" and (done.where(path) / "file").read_text() == "result"
+        assert parts(tmp_path) == []
+
+    def test_a_command_may_write_its_file_twice(self, tmp_path):
+        with outputs(tmp_path / "file") as done:
+            write_text(tmp_path / "file", "1")
+            write_text(tmp_path / "file", "2")
+        assert not done.failed and (tmp_path / "file").read_text() == "2"
+
+    @pytest.mark.parametrize("overwrite", [False, True])
+    def test_no_other_name_of_a_file_is_cut_off(self, tmp_path, overwrite):
+        path, other = tmp_path / "file", tmp_path / "other"
+        other.write_text("precious")
+        os.link(other, path)
+        with pytest.raises(InputError, match=r"is a file of 2 names \(hard links\)"):
+            outputs(path, overwrite=overwrite)
+        with pytest.raises(InputError, match="hard links"):
+            write_text(path, "new")
+        assert path.read_text() == other.read_text() == "precious"
+
+    def test_what_a_killed_command_left_is_removed_and_what_is_being_written_is_not(self, tmp_path):
+        left, busy, mine = (tmp_path / f"{PREFIX}{k}.part" for k in "abc")
+        left.write_text("half")
+        busy.write_text("half")
+        with outputs(tmp_path / "file"):
+            os.utime(busy, (1.0, 1.0))
+            mine.write_text("half")
+            write_text(tmp_path / "file", "1")
+        assert set(parts(tmp_path)) == {busy, mine}
 
     def test_an_empty_file_is_no_loss(self, tmp_path):
         (tmp_path / "file").write_text("")
@@ -312,6 +377,102 @@ class TestFolder:
         with pytest.raises(InputError, match="was not written by"):
             outputs(folder=tmp_path)
 
+    @pytest.mark.parametrize("overwrite", [False, True])
+    def test_a_pipe_as_list_is_none_and_hangs_nothing(self, tmp_path, overwrite):
+        os.mkfifo(tmp_path / MANIFEST)
+        if not overwrite:
+            with pytest.raises(InputError, match="was not written by `test`; .* --overwrite"):
+                outputs(folder=tmp_path)
+            return
+        with outputs(folder=tmp_path, overwrite=True) as done:
+            write_text(tmp_path / "table.md", "1")
+        assert not done.failed and list(json.loads((tmp_path / MANIFEST).read_text())["files"]) == ["table.md"]
+
+    def test_a_huge_list_is_none_and_is_not_read(self, tmp_path):
+        (tmp_path / "table.md").write_text("precious")
+        with (tmp_path / MANIFEST).open("wb") as file:
+            file.truncate(1 << 40)  # of holes
+        with pytest.raises(InputError, match="was not written by `test`; .* --overwrite"):
+            outputs(folder=tmp_path)
+
+    def test_a_list_that_is_a_link_is_not_followed(self, tmp_path):
+        out, other = tmp_path / "out", tmp_path / "other"
+        out.mkdir()
+        other.write_text("precious")
+        (out / MANIFEST).symlink_to(other)
+        with outputs(folder=out, overwrite=True):
+            write_text(out / "table.md", "1")
+        assert other.read_text() == "precious" and not (out / MANIFEST).is_symlink()
+
+    @pytest.mark.parametrize("overwrite", [False, True])
+    def test_a_pipe_in_place_of_a_file_hangs_nothing(self, tmp_path, elsewhere, overwrite):
+        with outputs(folder=tmp_path / "out"):
+            write_text(tmp_path / "out" / "table.md", "1")
+        (tmp_path / "out" / "table.md").unlink()
+        os.mkfifo(tmp_path / "out" / "table.md")
+        if not overwrite:
+            with pytest.raises(InputError, match="was changed since"):
+                outputs(folder=tmp_path / "out")
+            return
+        with outputs(folder=tmp_path / "out", overwrite=True) as done:
+            write_text(tmp_path / "out" / "table.md", "2")
+        assert (done.where(tmp_path / "out") / "table.md").read_text() == "2"
+
+    def test_what_was_changed_during_the_run_is_neither_replaced_nor_removed(self, tmp_path, elsewhere, capsys):
+        out = tmp_path / "out"
+        for change in ("table.md", "stale.md"):
+            with outputs(folder=out, overwrite=True):
+                write_text(out / "table.md", "1")
+                write_text(out / "stale.md", "1")
+            with outputs(folder=out) as done:
+                (out / change).write_text("precious")
+                write_text(out / "table.md", "2")
+            assert (out / change).read_text() == "precious"
+        assert "was changed since `test` wrote it" in capsys.readouterr().err
+        # What was changed and not written is no longer its own, and the folder is renewed again.
+        assert not done.failed
+        with outputs(folder=out):
+            write_text(out / "table.md", "3")
+
+    def test_parts_of_results_are_never_removed_and_hinder_nothing(self, tmp_path):
+        with pytest.raises(Stopped), outputs(folder=tmp_path):
+            write_text(partial(tmp_path / "table.json"), "half")
+            raise Stopped("half is written.")
+        for k in "12":
+            with outputs(folder=tmp_path):
+                write_text(tmp_path / "table.json", k)
+        assert (tmp_path / "table.partial.json").read_text() == "half"
+        with pytest.raises(Stopped), outputs(folder=tmp_path):
+            write_text(partial(tmp_path / "table.json"), "half again")
+            raise Stopped("half is written.")
+        with outputs(folder=tmp_path):
+            write_text(tmp_path / "table.json", "3")
+        assert (tmp_path / "table.partial.json").read_text() == "half"
+        assert (tmp_path / "table.partial2.json").read_text() == "half again"
+
+    def test_a_result_that_is_named_like_a_part_is_renewed(self, tmp_path):
+        for k in "12":
+            with outputs(folder=tmp_path) as done:
+                write_text(tmp_path / "x.partial.csv", k)
+            assert not done.failed and (tmp_path / "x.partial.csv").read_text() == k
+
+    def test_what_a_killed_command_left_hinders_nothing_and_is_removed(self, tmp_path):
+        (tmp_path / f"{PREFIX}half.part").write_text("half")
+        with pytest.raises(Stopped), outputs(folder=tmp_path):
+            raise KeyboardInterrupt
+        assert len(parts(tmp_path)) == 1
+        with outputs(folder=tmp_path):
+            write_text(tmp_path / "table.md", "1")
+        assert parts(tmp_path) == []
+
+    @pytest.mark.parametrize("overwrite", [False, True])
+    def test_a_hard_link_in_its_own_folder_is_refused_before_the_work(self, tmp_path, overwrite):
+        with outputs(folder=tmp_path / "out"):
+            write_text(tmp_path / "out" / "table.md", "1")
+        os.link(tmp_path / "out" / "table.md", tmp_path / "kept.md")
+        with pytest.raises(InputError, match="hard links"):
+            outputs(folder=tmp_path / "out", overwrite=overwrite)
+
     def test_the_list_names_no_file_outside(self, tmp_path):
         out, outside = tmp_path / "out", tmp_path / "precious"
         outside.write_text("precious")
@@ -340,10 +501,10 @@ class TestFullDisk:
 
     def test_the_earlier_file_is_untouched(self, full, elsewhere):
         path = full / "file"
-        path.write_text("mark: earlier")
-        with outputs(path):
+        path.write_text("earlier")
+        with outputs(path, overwrite=True):
             write_text(path, "x" * 9000)
-        assert path.read_text() == "mark: earlier"
+        assert path.read_text() == "earlier"
 
     def test_two_files_of_one_name_are_both_kept(self, full, elsewhere):
         first, second = full / "a" / "x", full / "b" / "x"
