@@ -7,6 +7,7 @@ python -m dms_core schema [--out FILE] [--overwrite]
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -110,11 +111,9 @@ def run(
         if stats is not None:
             write_json(stats, {**_summary(trajectory), "flags": [flag.as_dict() for flag in trajectory.flags]})
     # A table on standard output shall be nothing but a table.
-    lines = sys.stdout if descriptor(out) is None else sys.stderr
-    for key, value in _summary(trajectory).items():
-        shown = f"{value:.4g}" if isinstance(value, float) else value
-        print(f"{key.replace('_', ' ')}: {shown}", file=lines)
-    print(f"written: {outputs.where(out)}", file=lines)
+    with contextlib.redirect_stdout(sys.stdout if descriptor(out) is None else sys.stderr):
+        _print(_summary(trajectory))
+        print(f"written: {outputs.where(out)}")
     if not trajectory.success:
         print(f"The run failed: {trajectory.message} '{outputs.where(out)}' holds the part before.", file=sys.stderr)
         return FAILED_RUN
@@ -155,6 +154,13 @@ def _simulated(model: Model, options: SolverOptions, t_end: float, sample: float
 def _summary(trajectory: Trajectory) -> dict[str, Any]:
     """How a run ended, and the solver's statistics."""
     return {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
+
+
+def _print(summary: dict[str, Any]) -> None:
+    """A line for each of them."""
+    for key, value in summary.items():
+        shown = f"{value:.4g}" if isinstance(value, float) else value
+        print(f"{key.replace('_', ' ')}: {shown}")
 
 
 def table(trajectory: Trajectory, sample: float | None) -> Iterator[dict[str, np.ndarray]]:

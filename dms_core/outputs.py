@@ -8,9 +8,7 @@ more when a file takes its place.
 
 from __future__ import annotations
 
-import json
 import os
-import re
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -20,7 +18,7 @@ from typing import IO, NamedTuple
 
 from dms_core.errors import DmsError, InputError, Stopped
 from dms_core.input_file import digest
-from dms_core.json_text import checked, read_json
+from dms_core.output_list import MANIFEST, is_empty, read_list, write_list
 from dms_core.output_place import (
     Content,
     PlaceError,
@@ -31,20 +29,13 @@ from dms_core.output_place import (
     descriptor,
     identity,
     is_file,
-    is_unfinished,
     put,
     remove_unfinished,
-    renew,
     unfinished,
 )
-from dms_core.validation import Checked
 
-MANIFEST = ".written.json"
-"""List of a folder's files with their hashes."""
-LARGEST_LIST = 1 << 20
-"""Size up to which a list is read [byte]."""
-PARTIAL = re.compile(r".+\.partial\d*(\.[^.]*)?")
-"""Names of files with a part of the results."""
+LONGEST_NAME = 240
+"""Longest name to which '.partial' is added [byte]; of a longer one the end is left out, since systems take 255."""
 _active: list[Outputs] = []
 
 
@@ -54,14 +45,6 @@ class OutputFile(NamedTuple):
     option: str
     """By which the user names it."""
     path: Path
-
-
-class FileList(Checked):
-    """What stands in a folder's list."""
-
-    command: str
-    files: dict[str, str]
-    """Hashes by name."""
 
 
 class Outputs:
@@ -187,7 +170,7 @@ class Outputs:
             PlaceError: names it.
         """
         check_kind(path)
-        if path.parent == self.folder and path.exists() and not path.is_file():
+        if path.parent == self.folder and os.path.exists(path) and not path.is_file():
             raise PlaceError(f"output '{path}' is no regular file; remove it, or choose another --out.")
         if not is_file(path):
             return
@@ -210,7 +193,7 @@ class Outputs:
         if self.folder is None:
             return
         files = {path.name: hashed for path, hashed in self._own.items() if path.parent == self.folder}
-        renew(self.folder / MANIFEST, json.dumps({"command": self.command, "files": files}, indent=2) + "\n")
+        write_list(self.folder, self.command, files)
 
     def _remove_stale(self) -> None:
         """Remove what an earlier run of the command wrote and this one did not: it would be of other results."""
@@ -227,7 +210,7 @@ class Outputs:
         for option, path in files:
             if (same := self._input_at(path)) is not None:
                 raise InputError(f"{option} '{path}' is the input '{same}'; choose another place.")
-        known = [(identity(f.path), f) for f in files if is_file(f.path) or not f.path.exists()]
+        known = [(identity(f.path), f) for f in files if is_file(f.path) or not os.path.exists(f.path)]
         for k, (one, first) in enumerate(known):
             for other, second in known[:k]:
                 if one == other:
@@ -241,12 +224,12 @@ class Outputs:
         """Refuse a folder that cannot be written or that holds what must not be replaced."""
         check_folder(folder)
         check_kind(folder / MANIFEST)
-        listed = _listed(folder)
+        listed = read_list(folder)
         if listed is not None and listed.command == self.command:
             # By what is there, since a name in the list may reach outside or be none.
             names = listed.files.keys() - {MANIFEST}
             self._own = {path: listed.files[path.name] for path in folder.iterdir() if path.name in names}
-        if not self._own and _is_empty(folder, listed):
+        if not self._own and is_empty(folder):
             return
         for path in (folder, *self._own):
             if (same := self._input_at(path)) is not None:
@@ -270,7 +253,7 @@ class Outputs:
 
     def _input_at(self, path: Path) -> Path | None:
         """The input that a path names, if it does."""
-        if not path.exists():
+        if not os.path.exists(path):
             return None
         wanted = identity(path)
         return next((one for one in self._all_inputs() if identity(one) == wanted), None)
@@ -302,28 +285,16 @@ def partial(path: Path) -> Path:
     """A new name for a part of the results, run.partial.csv for run.csv; pipes and devices take the part themselves."""
     if path.exists() and not path.is_file():
         return path
-    count, part = 1, path.with_name(f"{path.stem}.partial{path.suffix}")
-    while part.exists():
+    stem = path.stem
+    while len(stem) > 1 and len(os.fsencode(stem + path.suffix)) > LONGEST_NAME:
+        stem = stem[:-1]
+    count, part = 1, path.with_name(f"{stem}.partial{path.suffix}")
+    while os.path.exists(part):
         count += 1
-        part = path.with_name(f"{path.stem}.partial{count}{path.suffix}")
+        part = path.with_name(f"{stem}.partial{count}{path.suffix}")
     if (outputs := active_outputs()) is not None:
         outputs.parts.add(part)
     return part
-
-
-def _listed(folder: Path) -> FileList | None:
-    """List of what a command wrote into a folder; None where there is none that can be read."""
-    try:
-        return checked(FileList, read_json(folder / MANIFEST, LARGEST_LIST), MANIFEST)
-    except InputError:
-        return None
-
-
-def _is_empty(folder: Path, listed: FileList | None) -> bool:
-    """Whether a folder holds nothing but parts of results, unfinished files and a list."""
-    names = {path.name for path in folder.iterdir()}
-    names = {name for name in names if not is_unfinished(name) and not PARTIAL.fullmatch(name)}
-    return names <= ({MANIFEST} if listed is not None else set())
 
 
 def _new_folder(reason: str) -> Path:

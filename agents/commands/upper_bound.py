@@ -51,8 +51,7 @@ def upper_bound(
     """
     check_numbers(patients, seed)
     options = f"--population {shlex.quote(population)} --patients {patients} --repetitions {repetitions} --seed {seed}"
-    options += f" --env {environment}" if environment != ENVIRONMENT else ""
-    options += f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else ""
+    options += _further(environment, exoskeleton)
     settings = {"repetitions": repetitions, "environment": environment, **device_settings(exoskeleton)}
     done: list[Tried] = []
     inputs = [population, exoskeleton]
@@ -72,11 +71,17 @@ def upper_bound(
             raise Stopped(f"{len(done)} of {patients} patients are in '{outputs.where(part)}'.") from None
         write_text(out, _table(rows_of(results, repetitions), options))
     for n in range(1, repetitions + 1):
-        print(f"{counted(patients, 'patient')} of '{population}', {counted(n, 'repetition')}, ", end="")
-        print(f"shared schedule {tried[best_together(results, n)].round(2)}, means:")
+        whom = f"{counted(patients, 'patient')} of '{population}', {counted(n, 'repetition')}"
+        print(f"{whom}, shared schedule {tried[best_together(results, n)].round(2)}, means:")
         print("  " + ", ".join(f"{k} {v:.3g}" for k, v in _means(rows_of(results, repetitions), n).items()))
     print(f"written: {outputs.where(out)}")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _further(environment: str, exoskeleton: str | None) -> str:
+    """Options that are not the usual ones, as they are typed."""
+    options = f" --env {environment}" if environment != ENVIRONMENT else ""
+    return options + (f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else "")
 
 
 def _means(rows: list[dict[str, float]], repetitions: int) -> dict[str, float]:
