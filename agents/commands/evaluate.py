@@ -67,7 +67,7 @@ def evaluate(
     plan = Plan(population, patients, seed, loads, environment, settings)
     inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
     with Outputs("evaluate", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
-        results = _results(used, plan, out / EVALUATION, workers, address)
+        results = _results(used, plan, outputs, out, workers, address)
         write_json(out / EVALUATION, results)
         write_text(out / "evaluation.md", "\n".join(whole_table(results)))
         _draw(out / "evaluation.png", results)
@@ -76,7 +76,9 @@ def evaluate(
     return FAILED_RUN if outputs.failed else 0
 
 
-def _results(used: Sequence[Policy], plan: Plan, path: Path, workers: str, address: str | None) -> dict[str, Any]:
+def _results(
+    used: Sequence[Policy], plan: Plan, outputs: Outputs, out: Path, workers: str, address: str | None
+) -> dict[str, Any]:
     """Results of all policies, with a bar over their episodes; see `_episodes`."""
     with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
 
@@ -88,16 +90,16 @@ def _results(used: Sequence[Policy], plan: Plan, path: Path, workers: str, addre
             from ..distributed.shared_evaluation import shared_out
 
             return shared_out(used, plan, address=address, progress=progress)
-        return results_of(used, _episodes(used, plan, progress, path), plan)
+        return results_of(used, _episodes(used, plan, progress, outputs, out), plan)
 
 
 def _episodes(
-    used: Sequence[Policy], plan: Plan, progress: Callable[[str], None], path: Path
+    used: Sequence[Policy], plan: Plan, progress: Callable[[str], None], outputs: Outputs, out: Path
 ) -> list[list[dict[str, Any]]]:
     """Episodes of each policy.
 
     Raises:
-        Stopped: by the user; what is done is written beside `path`.
+        Stopped: by the user; what is done is written into the folder `out`.
     """
     done: list[list[dict[str, Any]]] = []
     try:
@@ -107,11 +109,11 @@ def _episodes(
                 done[-1].append(episode)
                 progress(one.name)
     except KeyboardInterrupt:
-        raise Stopped(_kept(used, done, plan, path)) from None
+        raise Stopped(_kept(used, done, plan, outputs, out)) from None
     return done
 
 
-def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, path: Path) -> str:
+def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, outputs: Outputs, out: Path) -> str:
     """Write the policies that are done, or whole patients of the first one; says so in a sentence."""
     cases = len(plan.cases)
     whole = [episodes for episodes in done if len(episodes) == cases]
@@ -121,11 +123,11 @@ def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, 
         if patients == 0:
             return "no patient was done; nothing was written."
         whole, plan = [done[0][: patients * a_patient]], dataclasses.replace(plan, patients=patients)
-    part = partial(path)
+    part = partial(out / EVALUATION)
     write_json(part, results_of(used[: len(whole)], whole, plan))
     names = ", ".join(one.name for one in used[: len(whole)])
     verb = "is" if plan.patients == 1 else "are"
-    return f"{counted(plan.patients, 'patient')} with {names} {verb} in '{part}'."
+    return f"{counted(plan.patients, 'patient')} with {names} {verb} in '{outputs.where(part)}'."
 
 
 def _draw(path: Path, results: dict[str, Any]) -> None:
