@@ -53,7 +53,7 @@ demo: $(STAMP)
 	$(BIN)/python -m agents evaluate --policy pid none pid_yielding pid_compensated assist_as_needed learned \
 	    --patients 20 --out $(OUT)/evaluation
 	$(BIN)/python -m agents report $(OUT)/evaluation --policies pid learned --out $(OUT)/report
-	$(BIN)/python -m agents video --policy none pid learned --patient stroke_severe --out $(OUT)/assist.mp4
+	$(BIN)/python -m agents video --policy none pid learned --patient stroke_severe --out $(OUT)/assist.mp4 --overwrite
 	@echo "In $(abspath $(OUT)): figures of the paper in scenarios, tables and figures of the policies in report/report.md,"
 	@echo "all measures of 20 patients in evaluation, a severe patient alone, with the PID and with the policy in assist.mp4"
 
@@ -113,7 +113,7 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 
 docs: $(STAMP)
-	$(BIN)/python -m dms_core schema --out docs/model-files.md
+	$(BIN)/python -m dms_core schema --out docs/model-files.md --overwrite
 	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
 	cp $(OUT)/scenarios/fig12_joint_moments.png docs/scenarios.png
 

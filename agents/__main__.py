@@ -10,7 +10,7 @@ python -m agents sweep --configs FILE [FILE ...] --seeds S [S ...] --out DIR
 python -m agents upper-bound --out FILE.csv
 python -m agents video --policy A B --patient NAME --out FILE.mp4
 
-Every command that writes --out renews what it wrote itself; what others wrote it replaces with --overwrite only.
+A command renews a folder that it wrote; a file that exists, or a folder of others, it replaces with --overwrite only.
 Where the wheel is installed, the same commands stand under `python -m exo_agents`.
 """
 

@@ -7,10 +7,11 @@ python -m dms_core schema [--out FILE] [--overwrite]
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from tyro.conf import Positional, arg
@@ -25,12 +26,6 @@ from dms_core.outputs import OutputFile, Outputs, partial
 from dms_core.results import Result, States
 from dms_core.schema import reference
 
-TABLE, STATISTICS, REFERENCE = (
-    rb"\Atime_s,.*\bq\.",
-    rb'\A\{\s+"result": "',
-    rb"\A# Model files\s+Generated from the code",
-)
-"""Marks of files that the commands wrote, as regular expressions."""
 ROWS = 10_000
 """Rows of a table in memory at once."""
 
@@ -103,7 +98,33 @@ def run(
         stats: JSON file for the solver's statistics.
         step: constant step [s], at most t_end, instead of error control; rtol then only sets how far Newton's method
             goes. Where t_end is no multiple of it, the last step is shorter, and the message says so.
-        overwrite: replace files of these names that this command did not write.
+        overwrite: replace files of these names.
+    """
+    options = _options(t_end, sample, rtol, atol, step)
+    files = [OutputFile("--out", out), *([] if stats is None else [OutputFile("--stats", stats)])]
+    with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
+        trajectory = _simulated(compiled(model), options, t_end, sample)
+        if trajectory.result is Result.INTERRUPTED:
+            write_csv(part := partial(out), lambda: table(trajectory, sample))
+            raise Stopped(f"{trajectory.t[-1]:.4g} of {t_end:.4g} s are in '{outputs.where(part)}'.")
+        write_csv(out, lambda: table(trajectory, sample))
+        if stats is not None:
+            write_json(stats, {**_summary(trajectory), "flags": [flag.as_dict() for flag in trajectory.flags]})
+    # A table on standard output shall be nothing but a table.
+    with contextlib.redirect_stdout(sys.stdout if descriptor(out) is None else sys.stderr):
+        _print(_summary(trajectory))
+        print(f"written: {outputs.where(out)}")
+    if not trajectory.success:
+        print(f"The run failed: {trajectory.message} '{outputs.where(out)}' holds the part before.", file=sys.stderr)
+        return FAILED_RUN
+    return FAILED_RUN if outputs.failed else 0
+
+
+def _options(t_end: float, sample: float | None, rtol: float, atol: float | None, step: float | None) -> SolverOptions:
+    """The options of `run`, checked.
+
+    Raises:
+        InputError: names the option and what is allowed.
     """
     if not (np.isfinite(t_end) and t_end > 0.0):
         raise InputError(f"--t-end: Expected a positive time [s], got {t_end}.")
@@ -115,36 +136,31 @@ def run(
     for name, value in (("--step", step), ("--sample", sample)):
         if value is not None and value > t_end:
             raise InputError(f"{name}: Expected at most --t-end = {t_end} s, got {value} s.")
-    options = SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
-    files = [OutputFile("--out", out, TABLE)]
-    files += [] if stats is None else [OutputFile("--stats", stats, STATISTICS)]
-    with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
-        made = compiled(model)
-        check_columns(names := heads(made))
-        for option, time in (("--sample", sample), ("--step", step)):
-            if time is not None:
-                check_size(option, t_end, time, len(names))
-        simulation = Simulation(made, options)
-        with bar_of_run(t_end) as bar:
-            simulation.advance(t_end, moves(bar))
-        trajectory = simulation.trajectory()
-        if trajectory.result is Result.INTERRUPTED:
-            write_csv(part := partial(out), lambda: table(trajectory, sample))
-            raise Stopped(f"{trajectory.t[-1]:.4g} of {t_end:.4g} s are in '{outputs.where(part)}'.")
-        write_csv(out, lambda: table(trajectory, sample))
-        summary = {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
-        if stats is not None:
-            write_json(stats, {**summary, "flags": [flag.as_dict() for flag in trajectory.flags]})
-    # A table on standard output shall be nothing but a table.
-    lines = sys.stdout if descriptor(out) is None else sys.stderr
+    return SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
+
+
+def _simulated(model: Model, options: SolverOptions, t_end: float, sample: float | None) -> Trajectory:
+    """A run whose table can be written, with a bar over simulated time."""
+    check_columns(names := heads(model))
+    for option, time in (("--sample", sample), ("--step", options.fixed_step)):
+        if time is not None:
+            check_size(option, t_end, time, len(names))
+    simulation = Simulation(model, options)
+    with bar_of_run(t_end) as bar:
+        simulation.advance(t_end, moves(bar))
+    return simulation.trajectory()
+
+
+def _summary(trajectory: Trajectory) -> dict[str, Any]:
+    """How a run ended, and the solver's statistics."""
+    return {"result": trajectory.result.name, "message": trajectory.message, **trajectory.stats.as_dict()}
+
+
+def _print(summary: dict[str, Any]) -> None:
+    """A line for each of them."""
     for key, value in summary.items():
         shown = f"{value:.4g}" if isinstance(value, float) else value
-        print(f"{key.replace('_', ' ')}: {shown}", file=lines)
-    print(f"written: {outputs.where(out)}", file=lines)
-    if not trajectory.success:
-        print(f"The run failed: {trajectory.message} '{outputs.where(out)}' holds the part before.", file=sys.stderr)
-        return FAILED_RUN
-    return FAILED_RUN if outputs.failed else 0
+        print(f"{key.replace('_', ' ')}: {shown}")
 
 
 def table(trajectory: Trajectory, sample: float | None) -> Iterator[dict[str, np.ndarray]]:
@@ -178,13 +194,13 @@ def columns(states: States) -> dict[str, np.ndarray]:
 
 def schema(
     out: Annotated[FileOut | None, arg(help="file to write; default: standard output")] = None,
-    overwrite: Annotated[bool, arg(help="replace a file of this name that this command did not write")] = False,
+    overwrite: Annotated[bool, arg(help="replace a file of this name")] = False,
 ) -> int:
     """Print the reference of model files: every kind with its keys, units and defaults (Markdown)."""
     if out is None:
         print(reference(), end="")
         return 0
-    with Outputs("schema", files=[OutputFile("--out", out, REFERENCE)], overwrite=overwrite) as outputs:
+    with Outputs("schema", files=[OutputFile("--out", out)], overwrite=overwrite) as outputs:
         write_text(out, reference())
     return FAILED_RUN if outputs.failed else 0
 

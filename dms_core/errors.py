@@ -70,6 +70,11 @@ def choices(names) -> str:
     return ", ".join(names) if names else "none are declared"
 
 
+def counted(number: int, name: str) -> str:
+    """A number of things: '1 patient', '2 patients'."""
+    return f"{number} {name}" if number == 1 else f"{number} {name}s"
+
+
 def extra(name: str) -> str:
     """What to do where a package of an optional extra is missing."""
     return f'Install the extra "{name}"; in a checkout: pip install -c constraints.txt -e ".[{name}]"'

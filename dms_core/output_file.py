@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import json
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,6 +16,7 @@ from dms_core.errors import InputError
 from dms_core.json_text import finite
 from dms_core.output_place import Content, check_kind, put
 from dms_core.outputs import active_outputs
+from dms_core.validation import on_one_line
 
 DIGITS = ".12g"
 """Format of numbers in tables: more digits than any tolerance in use, fewer than rounding shows."""
@@ -54,14 +54,6 @@ def write_text(path: str | Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
-@contextlib.contextmanager
-def whole_file(path: str | Path) -> Iterator[IO[str]]:
-    """A text that becomes a file when the block ends without an exception, see `write_file`."""
-    text = io.StringIO(newline="\n")
-    yield text
-    write_text(path, text.getvalue())
-
-
 def write_csv(
     path: str | Path, columns: Mapping[str, np.ndarray] | Callable[[], Iterable[Mapping[str, np.ndarray]]]
 ) -> None:
@@ -95,7 +87,8 @@ def check_columns(names: Iterable[str]) -> None:
     """
     seen: set[str] = set()
     for name in names:
-        if any(map(_controls, name)):
+        # A space that does not break is a space to every reader.
+        if not all(c.isprintable() or unicodedata.category(c) == "Zs" for c in name):
             raise InputError(f"column {name!r}: expected a name without line breaks and other control characters.")
         if name in seen:
             raise InputError(f"column '{name}' would stand twice in the table; give the sensor another name.")
@@ -142,16 +135,6 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name}_{plain}" if plain not in ("", "-") else name
 
 
-def one_line(text: str) -> str:
-    """A text whose line breaks and other control characters are escaped, for a comment or a heading."""
-    return "".join(x.encode("unicode_escape").decode("ascii") if _controls(x) else x for x in text)
-
-
-def _controls(character: str) -> bool:
-    """Whether it breaks a line, controls a terminal, or is half a character."""
-    return unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp")
-
-
 def markdown_cell(text: str) -> str:
     """A text as cell of a Markdown table: a bar would end it."""
-    return one_line(text).replace("|", "\\|")
+    return on_one_line(text).replace("|", "\\|")

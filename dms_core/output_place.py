@@ -1,7 +1,8 @@
 """Where a file may be written, and how it takes its place whole or not at all.
 
 Symbolic links are followed: the link stays, what it names is replaced. Pipes and devices are written through; sockets
-and disks are refused. A file that is replaced keeps its permission bits and, where the system allows it, its owner.
+and disks are refused, and so is a file of several names (hard links), of which only one would be renewed. A file that
+is replaced keeps its permission bits and, where the system allows it, its owner.
 """
 
 from __future__ import annotations
@@ -9,14 +10,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import secrets
 import stat
 import sys
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO
 
-from dms_core.errors import InputError
+from dms_core.errors import InputError, both_ends
 
 PREFIX, SUFFIX = ".exo-", ".part"
 """Name of a file that is not whole yet; short whatever the name of the output is."""
@@ -29,10 +30,16 @@ REMEDIES = {
 """What to do about an error by its number; another place is always right."""
 PROBE = 4096
 """Written to see whether there is room at all [byte]."""
+LONGEST_PATH = 200
+"""Characters of a path in a message; of a longer one both ends are shown."""
 MOST_LINKS = 40
 """Symbolic links that Linux follows, one after another."""
 Content = Callable[[IO[bytes]], object]
 """Writes into an open file."""
+
+
+class PlaceError(InputError):
+    """A place where nothing must be written; what was to stand there may be written elsewhere."""
 
 
 def check_writable(path: str | Path) -> Path:
@@ -52,21 +59,27 @@ def check_kind(path: str | Path) -> Path:
     """The path, if what is there may be replaced or written through.
 
     Raises:
-        InputError: it is a folder, a socket, a disk, or read-only.
+        PlaceError: it is a folder, a socket, a disk, read-only, or a file of several names.
+        InputError: nothing could be there.
     """
     path = Path(path)
     mode = _mode(path)
     if mode is not None and stat.S_ISDIR(mode):
-        raise InputError(f"output '{path}' is a folder; give the name of a file in it.")
+        raise PlaceError(f"output '{path}' is a folder; give the name of a file in it.")
     if mode is None or _through(mode) or descriptor(path) is not None:
         return path
     if not stat.S_ISREG(mode):
-        raise InputError(
+        raise PlaceError(
             f"output '{path}' is a socket or a disk: expected a file, a pipe or a device such as /dev/null."
         )
     if not (mode & 0o222 and os.access(path, os.W_OK)):
-        raise InputError(
+        raise PlaceError(
             f"output '{path}' is read-only (mode {mode & 0o777:03o}); allow writing or choose another place."
+        )
+    if (names := os.stat(path).st_nlink) > 1:
+        raise PlaceError(
+            f"output '{path}' is a file of {names} names (hard links), of which only this one would be renewed; choose "
+            "another place, or remove this name first."
         )
     return path
 
@@ -109,6 +122,38 @@ def put(path: Path, content: Content) -> None:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None
 
 
+def renew(path: Path, text: str) -> None:
+    """Write a file that is ours alone: what else has its name, such as a link or a pipe, gives way to it.
+
+    Raises:
+        OSError: the disk is full or cannot be written, or a folder has the name.
+    """
+    try:
+        _replace(path, lambda file: file.write(text.encode()))
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+
+
+def is_unfinished(name: str) -> bool:
+    """Whether it is the name of a file that is not whole yet, or whose writer was killed."""
+    return name.startswith(PREFIX) and name.endswith(SUFFIX)
+
+
+def unfinished(folder: Path) -> dict[Path, int]:
+    """Files of a folder that are not whole, each with the time of its last change, which moves while one is written."""
+    with contextlib.suppress(OSError):
+        return {path: path.lstat().st_mtime_ns for path in folder.iterdir() if is_unfinished(path.name)}
+    return {}
+
+
+def remove_unfinished(before: Mapping[Path, int]) -> None:
+    """Remove files that are still as `unfinished` found them: their writer is gone."""
+    for path, changed in before.items():
+        with contextlib.suppress(OSError):
+            if path.lstat().st_mtime_ns == changed:
+                path.unlink()
+
+
 def identity(path: str | Path) -> tuple[object, ...]:
     """What is equal for two names of the same file: hard links and symbolic ones too."""
     try:
@@ -126,7 +171,7 @@ def is_file(path: str | Path) -> bool:
 
 def cannot(path: str | Path, error: OSError) -> str:
     """One sentence on an error of writing, with the place and what to do."""
-    return f"output '{_short(Path(path))}' cannot be written ({error.strerror or error}); {remedy(error)}."
+    return f"output '{_shown(path)}' cannot be written ({error.strerror or error}); {remedy(error)}."
 
 
 def remedy(error: OSError) -> str:
@@ -149,7 +194,8 @@ def descriptor(path: Path) -> int | None:
 
 def _replace(target: Path, content: Content) -> None:
     """Write beside a file, then take its name."""
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=PREFIX, suffix=SUFFIX)
+    # What replaces a private file is private from its first byte.
+    handle, temporary = _create(target.parent, 0o600 if target.exists() else 0o666)
     try:
         with os.fdopen(handle, "wb") as file:
             content(file)
@@ -159,28 +205,34 @@ def _replace(target: Path, content: Content) -> None:
         _take_permissions(temporary, target)
         os.replace(temporary, target)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
 
 
-def _take_permissions(temporary: str, target: Path) -> None:
-    """Owner and permission bits of the file that is replaced, or those of a new one."""
+def _create(folder: Path, mode: int) -> tuple[int, Path]:
+    """A new file that is not whole yet: its descriptor and name.
+
+    Args:
+        folder: of the file.
+        mode: permission bits, of which the system takes those of the umask away.
+    """
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)
+    while True:
+        path = folder / f"{PREFIX}{secrets.token_hex(6)}{SUFFIX}"
+        with contextlib.suppress(FileExistsError):
+            return os.open(path, flags, mode), path
+
+
+def _take_permissions(temporary: Path, target: Path) -> None:
+    """Owner and permission bits of the file that is replaced; a new one has those that the system gave it."""
     try:
         known = os.stat(target)
     except FileNotFoundError:
-        os.chmod(temporary, 0o666 & ~_umask())
         return
     if hasattr(os, "chown"):
         with contextlib.suppress(PermissionError):
             os.chown(temporary, known.st_uid, known.st_gid)
     os.chmod(temporary, stat.S_IMODE(known.st_mode))
-
-
-def _umask() -> int:
-    """Permission bits that new files do not get; it can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _mode(path: Path) -> int | None:
@@ -222,11 +274,11 @@ def _check_parent(path: Path, target: Path) -> None:
         for name in target.parts[len(there.parts) :]:
             if (count := len(os.fsencode(name))) > longest:
                 raise InputError(
-                    f"output '{_short(path)}': a name in it has {count} bytes; choose one of at most {longest}."
+                    f"output '{_shown(path)}': a name in it has {count} bytes; choose one of at most {longest}."
                 )
         folder.mkdir(parents=True, exist_ok=True)
         # Permission bits tell root nothing and network drives lie; only writing shows that writing works.
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=PREFIX, suffix=SUFFIX)
+        handle, temporary = _create(folder, 0o600)
         try:
             # A full disk still makes empty files.
             os.write(handle, bytes(PROBE))
@@ -234,11 +286,10 @@ def _check_parent(path: Path, target: Path) -> None:
             os.close(handle)
             os.unlink(temporary)
     except OSError as error:
-        reason = f"the folder '{_short(folder)}' cannot be written ({error.strerror}); {remedy(error)}"
-        raise InputError(f"output '{_short(path)}': {reason}.") from None
+        reason = f"the folder '{_shown(folder)}' cannot be written ({error.strerror}); {remedy(error)}"
+        raise InputError(f"output '{_shown(path)}': {reason}.") from None
 
 
-def _short(path: Path) -> str:
-    """A path for a message, the middle of a very long one left out."""
-    text = str(path)
-    return text if len(text) <= 200 else f"{text[:90]} ... {text[-90:]}"
+def _shown(path: str | Path) -> str:
+    """A path for a message."""
+    return both_ends(str(path), LONGEST_PATH)

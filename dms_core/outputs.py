@@ -1,30 +1,41 @@
 """What a command writes: checked before its work, never lost when its place fails, and never an input of it.
 
-A command says beforehand which files or which folder it will write. A file that it did not write before is replaced
-only with --overwrite: a file is known by its first or last bytes, a folder by a list of the files written into it.
+A command says beforehand which files or which folder it will write. A file that is there is replaced only with
+--overwrite, whatever it holds. A folder is renewed by the command that wrote it: a list in it has its files with their
+hashes, by which a file of others, or one that was changed since, is known. That is looked at before the work and once
+more when a file takes its place.
 """
 
 from __future__ import annotations
 
-import errno
-import json
 import os
-import re
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from dms_core.errors import DmsError, InputError, Stopped
 from dms_core.input_file import digest
-from dms_core.output_place import Content, cannot, check_folder, check_writable, descriptor, identity, is_file, put
+from dms_core.output_list import MANIFEST, is_empty, read_list, write_list
+from dms_core.output_place import (
+    Content,
+    PlaceError,
+    cannot,
+    check_folder,
+    check_kind,
+    check_writable,
+    descriptor,
+    identity,
+    is_file,
+    put,
+    remove_unfinished,
+    unfinished,
+)
 
-MANIFEST = ".written.json"
-"""List of a folder's files with their hashes."""
-HEAD, TAIL = 1 << 20, 1 << 16
-"""Bytes in which a file's mark is looked for, and bytes read at once."""
+LONGEST_NAME = 240
+"""Longest name to which '.partial' is added [byte]; of a longer one the end is left out, since systems take 255."""
 _active: list[Outputs] = []
 
 
@@ -34,8 +45,6 @@ class OutputFile(NamedTuple):
     option: str
     """By which the user names it."""
     path: Path
-    mark: bytes
-    """Regular expression, found in the beginning or end of files that the command wrote."""
 
 
 class Outputs:
@@ -46,11 +55,12 @@ class Outputs:
         files: that it writes.
         folder: into which it writes files.
         inputs: files and folders that it reads; a str may as well be a name that is no file.
-        overwrite: whether files of others may be replaced.
+        overwrite: whether files that are there, and are not known to be its own, may be replaced.
 
     Attributes:
         moved: folder that has what could not be written at its place, None where all could.
         written: files so far.
+        parts: files for a part of the results; they are not listed, so that no later run removes them.
 
     Raises:
         InputError: a place cannot be written, is an input or another output, or holds files of others.
@@ -68,12 +78,17 @@ class Outputs:
         self.command, self.folder, self.overwrite = command, folder, overwrite
         self.moved: Path | None = None
         self.written: list[Path] = []
+        self.parts: set[Path] = set()
         self._inputs = [x for x in inputs if x is not None]
-        self._known: dict[str, str] = {}
-        self._new: dict[str, str] = {}
+        self._own: dict[Path, str] = {}
+        """Files of the command, from this run or from the folder's list, with their hashes."""
         self._check_files(files)
         if folder is not None:
             self._check_folder(folder)
+        self._stale = set(self._own)
+        self._unfinished: dict[Path, int] = {}
+        for place in {Path(os.path.realpath(f.path)).parent for f in files} | ({folder} if folder else set()):
+            self._unfinished |= unfinished(place)
 
     def __enter__(self) -> Outputs:
         _active.append(self)
@@ -85,6 +100,7 @@ class Outputs:
         _active.remove(self)
         if error is None and self.moved is None:
             self._remove_stale()
+            remove_unfinished(self._unfinished)
         if isinstance(error, KeyboardInterrupt) and not isinstance(error, Stopped):
             raise Stopped(self.so_far()) from None
 
@@ -113,6 +129,8 @@ class Outputs:
             try:
                 self._put(path, content)
                 return
+            except PlaceError as error:
+                reason = str(error)
             except OSError as error:
                 if isinstance(error, BrokenPipeError) and descriptor(path) is not None:
                     raise  # The reader of standard output has seen enough.
@@ -131,79 +149,111 @@ class Outputs:
 
     def _put(self, path: Path, content: Content) -> None:
         """Write a file at its place and list it."""
-        inside = self.folder is not None and path.parent == self.folder
-        if inside and path.name not in (*self._known, *self._new) and is_file(path) and not self.overwrite:
-            raise FileExistsError(errno.EEXIST, f"it exists and was not written by `{self.command}`", str(path))
-        if is_file(path) and self._input_at(path) is not None:
-            raise FileExistsError(errno.EEXIST, "it is an input", str(path))
-        put(path, content)
+
+        def checked_content(file: IO[bytes]) -> None:
+            content(file)
+            # To write may take long.
+            self._check_place(path)
+
+        self._check_place(path)
+        put(path, checked_content)
         self.written.append(path)
-        if inside and is_file(path):
-            self._new[path.name] = digest(path)
+        if is_file(path) and path not in self.parts:
+            self._own[path] = digest(path)
+            self._stale.discard(path)
             self._list()
+
+    def _check_place(self, path: Path) -> None:
+        """Refuse a place that has got a file of others, or an input, since the command began.
+
+        Raises:
+            PlaceError: names it.
+        """
+        check_kind(path)
+        if path.parent == self.folder and os.path.exists(path) and not path.is_file():
+            raise PlaceError(f"output '{path}' is no regular file; remove it, or choose another --out.")
+        if not is_file(path):
+            return
+        if (same := self._input_at(path)) is not None:
+            raise PlaceError(f"output '{path}' is the input '{same}'.")
+        if self.overwrite or self._is_own(path):
+            return
+        what = "was changed since" if path in self._own else "exists and was not written by"
+        raise PlaceError(f"output '{path}' {what} `{self.command}`{' wrote it' if path in self._own else ''}.")
+
+    def _is_own(self, path: Path) -> bool:
+        """Whether a file is as the command wrote it."""
+        try:
+            return path in self._own and path.is_file() and digest(path) == self._own[path]
+        except InputError:
+            return False
 
     def _list(self) -> None:
         """Write the list of files now, so that a command that is killed leaves a folder that it can renew."""
-        assert self.folder is not None
-        text = json.dumps({"command": self.command, "files": self._known | self._new}, indent=2) + "\n"
-        put(self.folder / MANIFEST, lambda file: file.write(text.encode()))
+        if self.folder is None:
+            return
+        files = {path.name: hashed for path, hashed in self._own.items() if path.parent == self.folder}
+        write_list(self.folder, self.command, files)
 
     def _remove_stale(self) -> None:
         """Remove what an earlier run of the command wrote and this one did not: it would be of other results."""
-        stale = [name for name in self._known if name not in self._new]
-        if self.folder is None or not stale or not self._new:
+        if not self._stale or not self.written:
             return
-        for name in stale:
-            (self.folder / name).unlink(missing_ok=True)
-        self._known = {}
+        for path in self._stale:
+            if self._is_own(path):
+                path.unlink(missing_ok=True)
+            del self._own[path]
         self._list()
 
     def _check_files(self, files: Sequence[OutputFile]) -> None:
         """Refuse files that cannot be written or must not be replaced."""
-        for option, path, _ in files:
-            check_writable(path)
+        for option, path in files:
             if (same := self._input_at(path)) is not None:
                 raise InputError(f"{option} '{path}' is the input '{same}'; choose another place.")
-        known = [(identity(f.path), f) for f in files if is_file(f.path) or not f.path.exists()]
+        known = [(identity(f.path), f) for f in files if is_file(f.path) or not os.path.exists(f.path)]
         for k, (one, first) in enumerate(known):
             for other, second in known[:k]:
                 if one == other:
                     raise InputError(f"{second.option} and {first.option} are the same file '{first.path}'.")
-        for option, path, mark in files:
-            if is_file(path) and not self.overwrite and not re.search(mark, _ends(path)):
-                raise InputError(
-                    f"{option} '{path}' exists and was not written by `{self.command}`; choose another name, or give "
-                    "--overwrite to replace it."
-                )
+        for option, path in files:
+            check_writable(path)
+            if is_file(path) and not self.overwrite:
+                raise InputError(f"{option} '{path}' exists; choose another name, or give --overwrite to replace it.")
 
     def _check_folder(self, folder: Path) -> None:
         """Refuse a folder that cannot be written or that holds what must not be replaced."""
         check_folder(folder)
-        if not any(path.name != MANIFEST for path in folder.iterdir()):
+        check_kind(folder / MANIFEST)
+        listed = read_list(folder)
+        if listed is not None and listed.command == self.command:
+            # By what is there, since a name in the list may reach outside or be none.
+            names = listed.files.keys() - {MANIFEST}
+            self._own = {path: listed.files[path.name] for path in folder.iterdir() if path.name in names}
+        if not self._own and is_empty(folder):
             return
-        known = _listed(folder, self.command)
-        for path in (folder, *(folder / name for name in known or ())):
+        for path in (folder, *self._own):
             if (same := self._input_at(path)) is not None:
                 raise InputError(f"output '{path}' is the input '{same}'; choose another --out.")
+        for path in self._own:
+            check_kind(path)
         if self.overwrite:
-            self._known = {n: h for n, h in (known or {}).items() if _hash(folder / n) == h}
+            self._own = {path: hashed for path, hashed in self._own.items() if self._is_own(path)}
             return
-        if known is None:
+        if listed is None or listed.command != self.command:
             raise InputError(
                 f"output folder '{folder}' is not empty and was not written by `{self.command}`; choose another --out, "
                 "or give --overwrite to replace files of the same names in it."
             )
-        for name, hashed in known.items():
-            if _hash(folder / name) not in (hashed, None):
+        for path in self._own:
+            if not self._is_own(path):
                 raise InputError(
-                    f"output '{folder / name}' was changed since `{self.command}` wrote it; choose another --out, or "
+                    f"output '{path}' was changed since `{self.command}` wrote it; choose another --out, or "
                     "give --overwrite to replace it."
                 )
-        self._known = known
 
     def _input_at(self, path: Path) -> Path | None:
         """The input that a path names, if it does."""
-        if not path.exists():
+        if not os.path.exists(path):
             return None
         wanted = identity(path)
         return next((one for one in self._all_inputs() if identity(one) == wanted), None)
@@ -235,36 +285,16 @@ def partial(path: Path) -> Path:
     """A new name for a part of the results, run.partial.csv for run.csv; pipes and devices take the part themselves."""
     if path.exists() and not path.is_file():
         return path
-    count, part = 1, path.with_name(f"{path.stem}.partial{path.suffix}")
-    while part.exists():
+    stem = path.stem
+    while len(stem) > 1 and len(os.fsencode(stem + path.suffix)) > LONGEST_NAME:
+        stem = stem[:-1]
+    count, part = 1, path.with_name(f"{stem}.partial{path.suffix}")
+    while os.path.exists(part):
         count += 1
-        part = path.with_name(f"{path.stem}.partial{count}{path.suffix}")
+        part = path.with_name(f"{stem}.partial{count}{path.suffix}")
+    if (outputs := active_outputs()) is not None:
+        outputs.parts.add(part)
     return part
-
-
-def _hash(path: Path) -> str | None:
-    """Hash of a file; None where there is none."""
-    return digest(path) if path.is_file() else None
-
-
-def _listed(folder: Path, command: str) -> dict[str, str] | None:
-    """Files that a command wrote into a folder, with their hashes; None where it was another or nobody knows."""
-    try:
-        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        if content["command"] != command:
-            return None
-        # A name with a folder in it would reach outside.
-        return {str(k): str(v) for k, v in content["files"].items() if Path(k).name == k}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return None
-
-
-def _ends(path: Path) -> bytes:
-    """Beginning and end of a file."""
-    with path.open("rb") as file:
-        head = file.read(HEAD)
-        file.seek(max(file.seek(0, os.SEEK_END) - TAIL, len(head)))
-        return head + file.read()
 
 
 def _new_folder(reason: str) -> Path:

@@ -7,7 +7,7 @@ python -m exo_env arm26 --excitations FILE.csv --start-deg D --start-activation 
                         --out FILE.csv
 python -m exo_env soak --steps N [--env ID] [--exoskeleton NAME|FILE.yaml]
 
-Every command that writes --out renews what it wrote itself; what others wrote it replaces with --overwrite only.
+A command renews a folder that it wrote; a file that exists, or a folder of others, it replaces with --overwrite only.
 """
 
 from __future__ import annotations

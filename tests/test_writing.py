@@ -14,7 +14,6 @@ ALLOWED = {
         "os.write",
         "os.unlink",
         "chmod",
-        "tempfile.mkstemp",
         "mkdir",
         "unlink",
     },

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
-from dms_core.errors import DmsError, InputError, Stopped
+from dms_core.errors import DmsError, InputError, Stopped, counted
 from dms_core.output_file import write_json, write_text
 from dms_core.outputs import Outputs, partial
 from exo_env.rendering.panels import require_matplotlib
@@ -56,7 +56,7 @@ def evaluate(
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
         workers: 'ray' shares the episodes out, with the same results to the last bit.
         address: of a Ray cluster; a local one is started where it is not given.
-        overwrite: replace files in the folder that this command did not write.
+        overwrite: replace files in the folder that others wrote or changed.
     """
     if not policy_names:
         raise InputError("--policy: expected one or more names.")
@@ -67,18 +67,7 @@ def evaluate(
     plan = Plan(population, patients, seed, loads, environment, settings)
     inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
     with Outputs("evaluate", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
-        with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
-
-            def progress(name: str) -> None:
-                bar.set_description(name)
-                bar.update()
-
-            if workers == "ray":
-                from ..distributed.shared_evaluation import shared_out
-
-                results = shared_out(used, plan, address=address, progress=progress)
-            else:
-                results = results_of(used, _episodes(used, plan, progress, out / EVALUATION), plan)
+        results = _results(used, plan, outputs, out, workers, address)
         write_json(out / EVALUATION, results)
         write_text(out / "evaluation.md", "\n".join(whole_table(results)))
         _draw(out / "evaluation.png", results)
@@ -87,13 +76,30 @@ def evaluate(
     return FAILED_RUN if outputs.failed else 0
 
 
+def _results(
+    used: Sequence[Policy], plan: Plan, outputs: Outputs, out: Path, workers: str, address: str | None
+) -> dict[str, Any]:
+    """Results of all policies, with a bar over their episodes; see `_episodes`."""
+    with tqdm(total=len(used) * len(plan.cases), unit="episode", leave=False, disable=None) as bar:
+
+        def progress(name: str) -> None:
+            bar.set_description(name)
+            bar.update()
+
+        if workers == "ray":
+            from ..distributed.shared_evaluation import shared_out
+
+            return shared_out(used, plan, address=address, progress=progress)
+        return results_of(used, _episodes(used, plan, progress, outputs, out), plan)
+
+
 def _episodes(
-    used: Sequence[Policy], plan: Plan, progress: Callable[[str], None], path: Path
+    used: Sequence[Policy], plan: Plan, progress: Callable[[str], None], outputs: Outputs, out: Path
 ) -> list[list[dict[str, Any]]]:
     """Episodes of each policy.
 
     Raises:
-        Stopped: by the user; what is done is written beside `path`.
+        Stopped: by the user; what is done is written into the folder `out`.
     """
     done: list[list[dict[str, Any]]] = []
     try:
@@ -103,11 +109,11 @@ def _episodes(
                 done[-1].append(episode)
                 progress(one.name)
     except KeyboardInterrupt:
-        raise Stopped(_kept(used, done, plan, path)) from None
+        raise Stopped(_kept(used, done, plan, outputs, out)) from None
     return done
 
 
-def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, path: Path) -> str:
+def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, outputs: Outputs, out: Path) -> str:
     """Write the policies that are done, or whole patients of the first one; says so in a sentence."""
     cases = len(plan.cases)
     whole = [episodes for episodes in done if len(episodes) == cases]
@@ -117,10 +123,11 @@ def _kept(used: Sequence[Policy], done: list[list[dict[str, Any]]], plan: Plan, 
         if patients == 0:
             return "no patient was done; nothing was written."
         whole, plan = [done[0][: patients * a_patient]], dataclasses.replace(plan, patients=patients)
-    part = partial(path)
+    part = partial(out / EVALUATION)
     write_json(part, results_of(used[: len(whole)], whole, plan))
     names = ", ".join(one.name for one in used[: len(whole)])
-    return f"{plan.patients} patients with {names} are in '{part}'."
+    verb = "is" if plan.patients == 1 else "are"
+    return f"{counted(plan.patients, 'patient')} with {names} {verb} in '{outputs.where(part)}'."
 
 
 def _draw(path: Path, results: dict[str, Any]) -> None:

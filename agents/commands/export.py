@@ -44,7 +44,7 @@ def export(
         algorithm: of a .zip.
         action_mode: of a .zip, which does not say it: rope_tension, pid_setpoint, or one of your environment's own.
         environment: in which the model of a .zip was trained, by id.
-        overwrite: replace files in the folder that this command did not write.
+        overwrite: replace files in the folder that others wrote or changed.
     """
     policy = _policy(source, last, trust, statistics, algorithm, action_mode, environment)
     with Outputs("export", folder=out, inputs=[source, statistics], overwrite=overwrite) as outputs:

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
-from dms_core.errors import InputError
+from dms_core.errors import InputError, counted
 from dms_core.json_text import brief
-from dms_core.output_file import markdown_cell, one_line, write_text
+from dms_core.output_file import markdown_cell, write_text
 from dms_core.outputs import Outputs
+from dms_core.validation import on_one_line
 from exo_env.patient.population import population, shipped_populations
 from exo_env.rendering.panels import require_matplotlib
 
@@ -50,7 +51,7 @@ def report(
         seed: of these patients.
         environment: of the patients over time, by id; that of the evaluations or trainings where it is not given.
         exoskeleton: of the patients over time: device by name or YAML file, or changes of the default one as JSON.
-        overwrite: replace files in the folder that this command did not write.
+        overwrite: replace files in the folder that others wrote or changed.
     """
     require_matplotlib()
     used = None if environment is None else environment_id(environment)
@@ -156,13 +157,14 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
     worst = max(episodes, key=_badness)
     m = worst["measures"]
     why = "ended early" if m["unsafe"] else "largest error" if m.get("tracking_rms_deg") is not None else "least return"
-    columns = {f"{why} of {len(episodes)} episodes with {judged.title}": [_again(p, worst, results) for p in shown]}
+    title = f"{why} of {counted(len(episodes), 'episode')} with {judged.title}"
+    columns = {title: [_again(p, worst, results) for p in shown]}
     report_figures.time_courses(out / "worst_patient.png", columns)
     sentence = worst["event"] or f"return {m['return']:.4g}"
     if not worst["event"] and m.get("tracking_rms_deg") is not None:
         sentence = f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
     return [
-        f"## Worst patient of {one_line(judged.title)}",
+        f"## Worst patient of {on_one_line(judged.title)}",
         "",
         sentence,
         "",

@@ -59,7 +59,7 @@ def train(
                     tqdm.write(line)
                 done = run.run()
         except KeyboardInterrupt:
-            raise Stopped(f"at once; what was saved before is in '{folder.path}'.") from None
+            raise Stopped(f"what was saved before is in '{folder.path}'; the rest is lost.") from None
     if not done:
         stopped = f"stopped after {run.steps} steps, an unfinished round is dropped"
         print(f"{stopped}; go on with: {PROGRAM} train --resume {folder.path}")

@@ -17,8 +17,9 @@ from tyro.conf import arg
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
 from dms_core.errors import Stopped
-from dms_core.output_file import one_line, write_text
+from dms_core.output_file import write_text
 from dms_core.outputs import OutputFile, Outputs, partial
+from dms_core.validation import on_one_line
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.tuning import MEASURED, POPULATION, Try, tunable, tune
@@ -26,8 +27,6 @@ from ..policies.tuned import FILE
 from .options import device_settings
 
 TRIES = "baselines_tries.csv"
-NUMBERS, TABLE = rb"\A# Numbers of the baselines with the best mean return on ", rb"\A# python -m \w+ tune-baselines "
-"""Marks of the files that this command wrote, as regular expressions."""
 
 
 def tune_baselines(
@@ -54,18 +53,15 @@ def tune_baselines(
         out: folder of baselines.yml, which the policies read, and of the table of tries; default: where they read it.
         environment: in which, by id.
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
-        overwrite: replace files of these names that this command did not write.
+        overwrite: replace files of these names.
     """
     folder = (configs() / FILE).parent if out is None else out
     best, table = folder / Path(FILE).name, folder / TRIES
     settings = device_settings(exoskeleton)
     command = f"{PROGRAM} tune-baselines --tries {tries} --patients {patients} --seed {seed}"
-    command += f" --population {shlex.quote(population)}" if population != POPULATION else ""
-    command += f" --repetitions {repetitions}" if repetitions > 1 else ""
-    command += f" --env {environment}" if environment != ENVIRONMENT else ""
-    command += f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else ""
+    command += _further(population, repetitions, environment, exoskeleton)
     best_first: dict[str, list[Try]] = {}
-    files = [OutputFile("--out", best, NUMBERS), OutputFile("--out", table, TABLE)]
+    files = [OutputFile("--out", best), OutputFile("--out", table)]
     with Outputs("tune-baselines", files=files, inputs=[population, exoskeleton], overwrite=overwrite) as outputs:
         tried = _Tried(tries, table, command)
         with tried.kept_when_stopped(outputs):
@@ -80,6 +76,14 @@ def tune_baselines(
         print(f"{name:18} return {ranked[0].measures['return']:.1f}  {ranked[0].numbers}")
     print(f"written: {outputs.moved or folder}")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _further(population: str, repetitions: int, environment: str, exoskeleton: str | None) -> str:
+    """Options that are not the usual ones, as they are typed."""
+    options = f" --population {shlex.quote(population)}" if population != POPULATION else ""
+    options += f" --repetitions {repetitions}" if repetitions > 1 else ""
+    options += f" --env {environment}" if environment != ENVIRONMENT else ""
+    return options + (f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else "")
 
 
 class _Tried:
@@ -119,8 +123,8 @@ class _Tried:
 def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
     """Best numbers of each policy, with where they are from."""
     lines = [
-        f"# Numbers of the baselines with the best mean return on '{one_line(population)}', found by",
-        f"#   {one_line(command)}",
+        f"# Numbers of the baselines with the best mean return on '{on_one_line(population)}', found by",
+        f"#   {on_one_line(command)}",
         f"# All tries stand in {TRIES}.",
     ]
     for name, ranked in tries.items():
@@ -132,7 +136,7 @@ def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
 def _table(tries: dict[str, list[Try]], command: str) -> str:
     """All tries, best first."""
     text = io.StringIO()
-    text.write(f"# {one_line(command)}; means over the patients\n")
+    text.write(f"# {on_one_line(command)}; means over the patients\n")
     rows = csv.writer(text, lineterminator="\n")
     known = [m for m in MEASURED if all(m in one.measures for ranked in tries.values() for one in ranked)]
     rows.writerow(["policy", *known, "numbers"])

@@ -12,9 +12,10 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
-from dms_core.errors import Stopped
-from dms_core.output_file import one_line, write_text
+from dms_core.errors import Stopped, counted
+from dms_core.output_file import write_text
 from dms_core.outputs import OutputFile, Outputs, partial
+from dms_core.validation import on_one_line
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.evaluate import check_numbers
@@ -22,8 +23,6 @@ from ..evaluation.upper_bound import Tried, best_together
 from ..evaluation.upper_bound import upper_bound as bound
 from .options import device_settings
 
-TABLE = rb"\A# python -m \w+ upper-bound "
-"""Mark of the files that this command wrote, as a regular expression."""
 WHOLE = ("seed", "repetitions")
 """Columns of whole numbers."""
 
@@ -48,14 +47,15 @@ def upper_bound(
         seed: of the patients.
         environment: in which, by id; one with a PID and a reference.
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
-        overwrite: replace a file of this name that this command did not write.
+        overwrite: replace a file of this name.
     """
     check_numbers(patients, seed)
-    options = f"--population {population} --patients {patients} --repetitions {repetitions} --seed {seed}"
-    options += f" --env {environment}" if environment != ENVIRONMENT else ""
-    options += f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else ""
-    file, done = OutputFile("--out", out, TABLE), list[Tried]()
-    with Outputs("upper-bound", files=[file], inputs=[population, exoskeleton], overwrite=overwrite) as outputs:
+    options = f"--population {shlex.quote(population)} --patients {patients} --repetitions {repetitions} --seed {seed}"
+    options += _further(environment, exoskeleton)
+    settings = {"repetitions": repetitions, "environment": environment, **device_settings(exoskeleton)}
+    done: list[Tried] = []
+    inputs = [population, exoskeleton]
+    with Outputs("upper-bound", files=[OutputFile("--out", out)], inputs=inputs, overwrite=overwrite) as outputs:
         try:
             with tqdm(total=patients, unit="patient", leave=False, disable=None) as bar:
 
@@ -63,28 +63,32 @@ def upper_bound(
                     done.append(one)
                     bar.update()
 
-                results, tried = bound(
-                    population, patients, seed, repetitions=repetitions, environment=environment, progress=progress,
-                    **device_settings(exoskeleton),
-                )  # fmt: skip
+                results, tried = bound(population, patients, seed, progress=progress, **settings)
         except KeyboardInterrupt:
             if not done:
                 raise
             write_text(part := partial(out), _table(rows_of(done, repetitions), options))
             raise Stopped(f"{len(done)} of {patients} patients are in '{outputs.where(part)}'.") from None
-        rows = rows_of(results, repetitions)
-        write_text(out, _table(rows, options))
+        write_text(out, _table(rows_of(results, repetitions), options))
     for n in range(1, repetitions + 1):
-        means = {
-            c: float(np.mean([row[c] for row in rows if row["repetitions"] == n]))
-            for c in rows[0]
-            if c not in ("seed", "ability", "repetitions")
-        }
-        best = tried[best_together(results, n)].round(2)
-        print(f"{patients} patients of '{population}', {n} repetitions, shared schedule {best}, means:")
-        print("  " + ", ".join(f"{k} {v:.3g}" for k, v in means.items()))
+        whom = f"{counted(patients, 'patient')} of '{population}', {counted(n, 'repetition')}"
+        print(f"{whom}, shared schedule {tried[best_together(results, n)].round(2)}, means:")
+        print("  " + ", ".join(f"{k} {v:.3g}" for k, v in _means(rows_of(results, repetitions), n).items()))
     print(f"written: {outputs.where(out)}")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _further(environment: str, exoskeleton: str | None) -> str:
+    """Options that are not the usual ones, as they are typed."""
+    options = f" --env {environment}" if environment != ENVIRONMENT else ""
+    return options + (f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else "")
+
+
+def _means(rows: list[dict[str, float]], repetitions: int) -> dict[str, float]:
+    """Means of what was measured with a number of repetitions, over the patients."""
+    chosen = [row for row in rows if row["repetitions"] == repetitions]
+    measured = [column for column in rows[0] if column not in ("seed", "ability", "repetitions")]
+    return {column: float(np.mean([row[column] for row in chosen])) for column in measured}
 
 
 def rows_of(results: list[Tried], repetitions: int) -> list[dict[str, float]]:
@@ -97,7 +101,7 @@ def rows_of(results: list[Tried], repetitions: int) -> list[dict[str, float]]:
 def _table(rows: list[dict[str, float]], options: str) -> str:
     """Rows as CSV, below a line with the command."""
     text = io.StringIO()
-    text.write(f"# {PROGRAM} upper-bound {one_line(options)}\n")
+    text.write(f"# {PROGRAM} upper-bound {on_one_line(options)}\n")
     writer = csv.DictWriter(text, rows[0], lineterminator="\n")
     writer.writeheader()
     writer.writerows({k: v if k in WHOLE else f"{v:.4g}" for k, v in row.items()} for row in rows)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from tqdm import tqdm
@@ -14,11 +13,11 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import DmsError, InputError, Stopped, extra
-from dms_core.output_file import write_file
+from dms_core.output_file import write_bytes
 from dms_core.outputs import OutputFile, Outputs
 from exo_env.patient.population import population
 
-from ..environment import ENVIRONMENT, PROGRAM, environment_id
+from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.episode import world_of
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
@@ -27,8 +26,6 @@ from .options import device_settings, different_policies, repeated
 BAND, FONT, MOST = 44, 18, 4
 """Height of the titles and size of their letters [pixel], and policies that fit side by side."""
 INK, WARNING, PAPER = (40, 40, 40), (190, 50, 20), (255, 255, 255)
-MADE_BY, MARK = f"{PROGRAM} video", rb"python -m \w+ video"
-"""Comment in the files, and the regular expression by which they are known."""
 GIF_STEP = 2
 """A GIF takes every second picture: it is large, and few viewers show 50 a second."""
 
@@ -53,7 +50,7 @@ def video(
         repetitions: of the movement; as the trained policies learned, 1 without one, where not given.
         environment: in which, by id; module:ID where another package registers it.
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
-        overwrite: replace a file of this name that this command did not write.
+        overwrite: replace a file of this name.
     """
     if not 1 <= len(policy_names) <= MOST:
         raise InputError(f"--policy: expected one to {MOST} names, got {len(policy_names)}.")
@@ -64,24 +61,31 @@ def video(
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     out = _possible(out)
     inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
-    file = OutputFile("--out", out, MARK)
-    with Outputs("video", files=[file], inputs=inputs, overwrite=overwrite) as outputs:
-        stages = [Stage(policy, patient, seed, environment, **settings) for policy in used]
-        rate, total = stages[0].rate, stages[0].length
-        drawn = 0
-        with tqdm(total=total, unit="picture", leave=False, disable=None) as bar:
-
-            def progress() -> None:
-                nonlocal drawn
-                drawn += 1
-                bar.update()
-
-            try:
-                _write(out, _shown(pictures(stages), progress, GIF_STEP if out.suffix == ".gif" else 1), rate)
-            except KeyboardInterrupt:
-                raise Stopped(f"{drawn} of {total} pictures were drawn; nothing was written.") from None
+    with Outputs("video", files=[OutputFile("--out", out)], inputs=inputs, overwrite=overwrite) as outputs:
+        _film(out, [Stage(policy, patient, seed, environment, **settings) for policy in used])
     print(f"written: {outputs.where(out)}")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _film(out: Path, stages: list[Stage]) -> None:
+    """Draw and write all pictures, with a bar.
+
+    Raises:
+        Stopped: by the user; nothing is written.
+    """
+    rate, total = stages[0].rate, stages[0].length
+    drawn = 0
+    with tqdm(total=total, unit="picture", leave=False, disable=None) as bar:
+
+        def progress() -> None:
+            nonlocal drawn
+            drawn += 1
+            bar.update()
+
+        try:
+            _write(out, _shown(pictures(stages), progress, GIF_STEP if out.suffix == ".gif" else 1), rate)
+        except KeyboardInterrupt:
+            raise Stopped(f"{drawn} of {total} pictures were drawn; nothing was written.") from None
 
 
 class Stage:
@@ -183,7 +187,6 @@ def _write(out: Path, shown: Iterator[np.ndarray], rate: int) -> None:
 
     if out.suffix == ".mp4":
         options: dict[str, Any] = {"fps": rate, "codec": "libx264", "macro_block_size": 2, "quality": 7}
-        options["output_params"] = ["-metadata", f"comment={MADE_BY}"]
     else:
         options = {"duration": 1000.0 * GIF_STEP / rate, "loop": 0}
     # The other program writes into a folder of its own, and what it leaves there goes with the folder.
@@ -196,15 +199,4 @@ def _write(out: Path, shown: Iterator[np.ndarray], rate: int) -> None:
                     opened.append_data(picture)
         except OSError as error:
             raise DmsError(f"the film cannot be made in '{folder}': {error.strerror or error}.") from None
-        write_file(out, lambda file: _copy(film, file))
-
-
-def _copy(film: Path, file: IO[bytes]) -> None:
-    """A film with the comment that says what made it; the writer of GIFs takes none."""
-    with film.open("rb") as made:
-        if film.suffix == ".mp4":
-            shutil.copyfileobj(made, file)
-            return
-        content, comment = made.read(), MADE_BY.encode()
-    # GIF89a: a comment extension, before the byte that ends the file.
-    file.write(content[:-1] + bytes([0x21, 0xFE, len(comment)]) + comment + b"\0" + content[-1:])
+        write_bytes(out, film.read_bytes())

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dms_core.errors import counted
 from exo_env.rendering.panels import drawn, legend, literal, panels, save
 
 from .figure import COLOURS
@@ -102,7 +103,7 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
         what = f"mean difference to {policies[0]['title']}, patient by patient"
         other.set_title(literal(what + (f"\n(far off: {', '.join(left_out)})" if left_out else "")), fontsize=9)
     percent = 100.0 * results["confidence"]
-    whom = f"{results['patients']} patients, {results['population']}; {percent:g} % intervals"
+    whom = f"{counted(results['patients'], 'patient')}, {results['population']}; {percent:g} % intervals"
     figure.supxlabel(literal(whom), fontsize=9)
     legend(figure, ax, 3)
     save(figure, path)

@@ -9,7 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dms_core.output_file import markdown_cell, one_line
+from dms_core.errors import counted
+from dms_core.output_file import markdown_cell
+from dms_core.validation import on_one_line
 
 from ..environment import ENVIRONMENT
 from ..policies.baselines import POLICIES
@@ -34,8 +36,7 @@ def statistic(results: Mapping[str, Any]) -> str:
 def heading(results: Mapping[str, Any]) -> str:
     """Whom a table is about."""
     often, loads = results.get("settings", {}).get("repetitions", 1), results.get("loads", ())
-    count = results["patients"]
-    whom = f"{count} patient{'s' * (count > 1)} of '{results['population']}', seed {results['seed']}"
+    whom = f"{counted(results['patients'], 'patient')} of '{results['population']}', seed {results['seed']}"
     whom += f", loads {' '.join(f'{x:g}' for x in loads)} kg" if loads else ""
     whom += f", {often} repetitions" if often > 1 else ""
     return whom + (f", in {where}" if (where := results.get("environment", ENVIRONMENT)) != ENVIRONMENT else "")
@@ -92,8 +93,8 @@ def whole_table(results: Mapping[str, Any]) -> list[str]:
     """
     head, *rows = ([markdown_cell(cell) for cell in row] for row in table_rows(results))
     return [
-        f"## {one_line(heading(results))}", "", f"{statistic(results).capitalize()}.",
-        *map(one_line, left_out_lines(results)), "",
+        f"## {on_one_line(heading(results))}", "", f"{statistic(results).capitalize()}.",
+        *map(on_one_line, left_out_lines(results)), "",
         f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
     ]  # fmt: skip
 

@@ -15,8 +15,6 @@ from dms_core.outputs import OutputFile, Outputs, partial
 from dms_core.results import Result
 from exo_env.ecosystem import bare_arm as bare
 
-TABLE = rb"\Atime_s,elbow_flexion_rad,"
-"""Mark of the files that this command wrote, as a regular expression."""
 COLUMNS = 1 + 3 + 6 * 4 + 6
 """Of the table, roughly: time, elbow, six muscles and the elbow's reaction."""
 
@@ -42,18 +40,10 @@ def arm26(
         start_activation: of every muscle at the start, 0.01 to 1 [-].
         rtol: relative tolerance of the error per step.
         sample: time between rows [s].
-        overwrite: replace a file of this name that this command did not write.
+        overwrite: replace a file of this name.
     """
-    for name, value in (("--t-end", t_end), ("--sample", sample)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"{name} {value}: expected a time above 0 s.")
-    if not -180.0 < start_deg < 180.0:
-        raise InputError(f"--start-deg {start_deg}: expected an angle between -180 and 180 deg.")
-    if not MINIMUM <= start_activation <= 1.0:
-        raise InputError(f"--start-activation {start_activation}: expected a number from {MINIMUM} to 1.")
-    check_size("--sample", t_end, sample, COLUMNS)
-    file = OutputFile("--out", out, TABLE)
-    with Outputs("arm26", files=[file], inputs=[excitations], overwrite=overwrite) as outputs:
+    _check(t_end, sample, start_deg, start_activation)
+    with Outputs("arm26", files=[OutputFile("--out", out)], inputs=[excitations], overwrite=overwrite) as outputs:
         system = bare.bare_arm(math.radians(start_deg), bare.read_excitations(excitations), start_activation)
         simulation = Simulation(system, SolverOptions(rtol=rtol))
         with bar_of_run(t_end) as bar:
@@ -70,3 +60,19 @@ def arm26(
         print(f"The run failed; '{outputs.where(out)}' holds the part before.", file=sys.stderr)
         return FAILED_RUN
     return FAILED_RUN if outputs.failed else 0
+
+
+def _check(t_end: float, sample: float, start_deg: float, start_activation: float) -> None:
+    """Refuse options that are out of their ranges.
+
+    Raises:
+        InputError: names the option and what is allowed.
+    """
+    for name, value in (("--t-end", t_end), ("--sample", sample)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"{name} {value}: expected a time above 0 s.")
+    if not -180.0 < start_deg < 180.0:
+        raise InputError(f"--start-deg {start_deg}: expected an angle between -180 and 180 deg.")
+    if not MINIMUM <= start_activation <= 1.0:
+        raise InputError(f"--start-activation {start_activation}: expected a number from {MINIMUM} to 1.")
+    check_size("--sample", t_end, sample, COLUMNS)

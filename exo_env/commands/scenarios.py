@@ -48,7 +48,7 @@ def scenarios(
         scenarios: scenarios, as in configs/scenarios/1_healthy.yaml; without them, the paper's four. The names of their
             files without the ending name the tables.
         rtol: relative tolerance of the error per step.
-        overwrite: replace files in the folder that this command did not write.
+        overwrite: replace files in the folder that others wrote or changed.
     """
     require_matplotlib()
     theirs, names, declared = _declared(exercise, scenarios)

@@ -28,7 +28,7 @@ def tune(
         out: folder for the figures and tuning.json; made where it is missing.
         exoskeleton: device, by name or YAML file; configs/exoskeletons/elbow.yaml shows every key. Its own `gains` and
             `tuning` do not count.
-        overwrite: replace files in the folder that this command did not write.
+        overwrite: replace files in the folder that others wrote or changed.
     """
     require_matplotlib()
     device = Exoskeleton.named(exoskeleton)

@@ -19,6 +19,7 @@ from agents.evaluation.tables import short_table, whole_table
 from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint, repetitions_of
 from agents.policies.safetensors import from_bytes, to_bytes
 from agents.training.records import read_curve, read_point, read_record, read_state
+from dms_core.outputs import MANIFEST, Outputs
 from exo_env.ecosystem.bare_arm import read_excitations
 from tests.fuzz.damage import is_read_or_refused, of_bytes, of_json
 
@@ -33,6 +34,7 @@ SESSION = {"started": "2026-11-27T17:20:54+00:00", "command": "train", "versions
 RECORD = {"environment": ENVIRONMENT, "algorithm": "ppo", "seed": 0, "sessions": [SESSION]}
 STATE = {"steps": 64, "updates": 8, "episodes": 3, "seconds": 1.5, "evaluations": CURVE}
 HASHES = {"policy.json": hashlib.sha256(b"{}").hexdigest()}
+WRITTEN = {"command": "evaluate", "files": {"table.md": hashlib.sha256(b"precious").hexdigest()}}
 EXCITATIONS = "time_s,TRIlong,TRIlat,TRImed,BIClong,BICshort,BRA\n0,0,0,0,0,0.1,1e-1\n0.5,0,0,0,1,0,0.25\n"
 HEADER = int.from_bytes(WEIGHTS["lstm"][:8], "little")
 
@@ -150,6 +152,22 @@ def test_checkpoints(folder, hashes, pointer, pointed):
 def test_settings_on_the_command_line(content):
     is_read_or_refused(device_settings, "{" + content.decode("utf-8", "surrogateescape"))
     is_read_or_refused(device_settings, content.decode("utf-8", "replace"))
+
+
+@given(of_json(json.dumps(WRITTEN)))
+def test_lists_of_what_was_written(folder, content):
+    place, outside = folder / "written", folder / "x"
+    place.mkdir(exist_ok=True)
+    for path in (place / "table.md", outside):
+        path.write_bytes(b"precious")
+    (place / MANIFEST).write_bytes(content)
+    outputs = is_read_or_refused(lambda: Outputs("evaluate", folder=place))
+    if outputs is not None:
+        # What the list names may be renewed or removed: nothing but the folder's own file, as it was written.
+        with outputs:
+            outputs.write(place / "new.md", lambda file: file.write(b"1"))
+        (place / "new.md").unlink()
+    assert outside.read_bytes() == b"precious"
 
 
 @given(of_bytes(EXCITATIONS.encode()))

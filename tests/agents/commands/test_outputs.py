@@ -40,7 +40,7 @@ def test_a_policy_is_not_evaluated_into_its_own_folder(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["film.gif", "film.mp4"])
-def test_a_film_is_known_by_its_comment(tmp_path, name, monkeypatch, capsys):
+def test_a_film_is_replaced_with_the_flag(tmp_path, name, monkeypatch, capsys):
     imageio = pytest.importorskip("imageio.v2")
     pytest.importorskip("pygame")
     if name.endswith("mp4"):
@@ -49,23 +49,18 @@ def test_a_film_is_known_by_its_comment(tmp_path, name, monkeypatch, capsys):
 
     monkeypatch.setattr(video, "pictures", lambda stages, known=video.pictures: islice(known(stages), 6))
     command = ["video", "--policy", "none", "--out", str(tmp_path / name)]
-    for _ in range(2):
-        assert main(command) == 0
+    assert [main(command), main(command), main([*command, "--overwrite"])] == [0, 2, 0]
+    assert f"{name}' exists; choose another name" in capsys.readouterr().err
     assert sum(1 for _ in imageio.get_reader(tmp_path / name)) >= 2  # readers take it
-    (tmp_path / name).write_bytes(b"a film of others")
-    assert main(command) == 2 and "was not written by `video`" in capsys.readouterr().err
 
 
-def test_numbers_of_the_baselines_are_known_by_their_first_line(tmp_path, monkeypatch, capsys):
+def test_numbers_of_the_baselines_are_replaced_with_the_flag(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
         "agents.commands.tune_baselines.tune", lambda name, *given, **more: [Try(name, {"x": 1.0}, {"return": 2.0})]
     )
     command = ["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]
-    for _ in range(2):
-        assert main(command) == 0
-    (tmp_path / "baselines.yml").write_text("pid: {authority: 1}")
-    assert main(command) == 2 and "baselines.yml' exists and was not written by" in capsys.readouterr().err
-    assert main([*command, "--overwrite"]) == 0
+    assert [main(command), main(command), main([*command, "--overwrite"])] == [0, 2, 0]
+    assert "baselines.yml' exists; choose another name" in capsys.readouterr().err
 
 
 def test_a_line_break_in_a_name_stays_in_its_comment():
@@ -85,12 +80,12 @@ def test_names_with_bars_and_breaks_leave_a_table_whole(tmp_path):
     assert {row.replace("\\|", "").count("|") for row in rows} == {3}
 
 
-def test_a_table_of_schedules_is_renewed(tmp_path, capsys):
+def test_a_table_of_schedules_is_replaced_with_the_flag(tmp_path, capsys):
     out = tmp_path / "bound.csv"
     command = ["upper-bound", "--patients", "1", "--population", "stroke_mild", "--out", str(out)]
-    for _ in range(2):
-        assert main(command) == 0
+    assert main(command) == 0 and capsys.readouterr().out.startswith("1 patient of 'stroke_mild', 1 repetition, shared")
     with out.open(newline="") as file:
         assert file.readline().startswith("# python -m agents upper-bound ") and len(list(csv.DictReader(file))) == 1
     out.write_text("seed,ability\n")
     assert main(command) == 2 and out.read_text() == "seed,ability\n"
+    assert main([*command, "--overwrite"]) == 0

@@ -1,5 +1,6 @@
 """Ctrl-C in commands: status 130, a sentence on what is kept, and no traceback, of no process."""
 
+import errno
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ import pytest
 from agents.__main__ import main
 from agents.commands.report_input import collected
 from agents.evaluation.tuning import Try, _pool
+from dms_core import output_place
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -59,7 +61,35 @@ def test_an_evaluation_keeps_whole_patients_of_its_first_policy(stopped_at, tmp_
     assert main([*EVALUATE, "--loads", "1", "2", "--out", str(tmp_path)]) == 130
     found = json.loads((tmp_path / "evaluation.partial.json").read_text())
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 2
-    assert "1 patients with none" in capsys.readouterr().err
+    assert "stopped: 1 patient with none is in " in capsys.readouterr().err
+
+
+def test_a_part_outlives_the_next_evaluations(stopped_at, tmp_path):
+    stopped_at("agents.evaluation.evaluate.episode", 2)
+    assert main(["evaluate", "--policy", "none", "--patients", "2", "--out", str(tmp_path)]) == 130
+    part = tmp_path / "evaluation.partial.json"
+    before = part.read_bytes()
+    for _ in range(2):
+        assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path)]) == 0
+    assert part.read_bytes() == before
+
+
+def test_an_evaluation_says_where_its_part_is_when_the_disk_is_full(stopped_at, tmp_path, capsys, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    known = output_place._replace
+
+    def full(target, content):
+        if target.parent == tmp_path / "out":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        known(target, content)
+
+    monkeypatch.setattr(output_place, "_replace", full)
+    stopped_at("agents.evaluation.evaluate.episode", 4)
+    assert main([*EVALUATE, "--out", str(tmp_path / "out")]) == 130
+    (kept,) = (tmp_path / "temporary").iterdir()
+    assert f"stopped: 2 patients with none are in '{kept}'." in capsys.readouterr().err
+    assert (kept / "evaluation.partial.json").exists()
 
 
 def test_an_evaluation_that_did_nothing_says_so(stopped_at, tmp_path, capsys):

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from dms_core.command_line import BAR, FAILED_RUN, USER_MISTAKE, moves
 from dms_core.config_files import config_file, configs
-from dms_core.output_file import whole_file, with_unit, write_csv
+from dms_core.output_file import with_unit, write_csv, write_file
 from dms_core.schema import reference
 
 ROOT = configs().parent
@@ -170,9 +170,13 @@ class TestOutputPlace:
     def test_nothing_half_written_is_left(self, tmp_path):
         path = tmp_path / "table.csv"
         path.write_text("old\n")
-        with pytest.raises(RuntimeError), whole_file(path) as file:
-            file.write("half of the new")
+
+        def content(file):
+            file.write(b"half of the new")
             raise RuntimeError
+
+        with pytest.raises(RuntimeError):
+            write_file(path, content)
         assert path.read_text() == "old\n" and list(tmp_path.iterdir()) == [path]
 
     def test_a_whole_file_replaces_the_old_one(self, tmp_path):

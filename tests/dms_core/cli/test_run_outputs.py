@@ -29,11 +29,25 @@ def never(monkeypatch):
     monkeypatch.setattr("dms_core.__main__.Simulation", lambda *given: pytest.fail("the run began"))
 
 
-def test_the_same_command_twice(tmp_path):
-    command = [*RUN, "--out", str(tmp_path / "run.csv"), "--stats", str(tmp_path / "run.json")]
-    assert [main(command), main(command)] == [0, 0]
-    command = ["schema", "--out", str(tmp_path / "reference.md")]
-    assert [main(command), main(command)] == [0, 0]
+def test_the_same_command_twice_needs_the_flag(tmp_path, capsys):
+    for command in (
+        [*RUN, "--out", str(tmp_path / "run.csv"), "--stats", str(tmp_path / "run.json")],
+        ["schema", "--out", str(tmp_path / "reference.md")],
+    ):
+        assert [main(command), main(command), main([*command, "--overwrite"])] == [0, 2, 0]
+        assert "exists; choose another name, or give --overwrite to replace it." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "content"),
+    [("--stats", '{\n  "result": "mine",\n  "work": 1}\n'), ("--out", "time_s, my own data q.x\n1,2\n")],
+)
+def test_what_looks_like_a_result_is_not_replaced(never, tmp_path, capsys, option, content):
+    mine = tmp_path / "mine"
+    mine.write_text(content)
+    others = [] if option == "--out" else ["--out", str(tmp_path / "x.csv")]
+    assert main([*RUN, *others, option, str(mine)]) == 2 and mine.read_text() == content
+    assert f"{option} '{mine}' exists" in capsys.readouterr().err
 
 
 def test_the_model_is_not_overwritten(never, tmp_path, capsys):
@@ -47,11 +61,10 @@ def test_the_model_is_not_overwritten(never, tmp_path, capsys):
 
 
 def test_a_table_of_others_is_not_overwritten(never, tmp_path, capsys):
-    # An input of other commands, which begins as a table of this one does.
     table = tmp_path / "excitations.csv"
     table.write_text("time_s,BIClong\n0,0.5\n")
     assert main([*RUN, "--out", str(table)]) == 2
-    assert "was not written by `run`" in capsys.readouterr().err and table.read_text().endswith("0.5\n")
+    assert "exists; choose another name" in capsys.readouterr().err and table.read_text().endswith("0.5\n")
 
 
 def test_one_file_does_not_take_both(never, tmp_path, capsys):
@@ -103,8 +116,6 @@ def test_a_name_with_a_comma_is_one_column(tmp_path):
         import pandas
 
         assert pandas.read_csv(out).columns.tolist() == list(rows[0])
-    # It is still known as its own.
-    assert main(["run", str(model), "--t-end", "0.1", "--out", str(out)]) == 0
 
 
 def test_a_full_disk_loses_no_run(tmp_path, capsys, monkeypatch):
@@ -136,7 +147,7 @@ def test_ctrl_c_keeps_the_part_under_a_name_that_says_so(tmp_path, capsys, monke
     monkeypatch.setattr(Simulation, "_advance", advance)
     out = tmp_path / "run.csv"
     out.write_text("time_s,q.x,v.x\n0,0,0\n")
-    assert main([*RUN, "--out", str(out)]) == 130
+    assert main([*RUN, "--out", str(out), "--overwrite"]) == 130
     part = tmp_path / "run.partial.csv"
     assert calls and capsys.readouterr().err.endswith(f"of 0.1 s are in '{part}'.\n")
     assert out.read_text() == "time_s,q.x,v.x\n0,0,0\n"

@@ -12,7 +12,6 @@ from dms_core.output_file import (
     check_columns,
     check_size,
     markdown_cell,
-    one_line,
     write_csv,
     write_json,
 )
@@ -29,7 +28,7 @@ class TestTables:
         assert tuple(rows[0]) == self.NAMES and rows[1:] == [[str(k + n) for k in range(6)] for n in range(3)]
         np.testing.assert_array_equal(np.loadtxt(path, delimiter=",", skiprows=1, encoding="utf-8")[:, 1], [1, 2, 3])
 
-    @pytest.mark.parametrize("name", ["a\nb", "a\rb", "a\x00b", "a\u2028b", "\ud800"])
+    @pytest.mark.parametrize("name", ["a\nb", "a\rb", "a\x00b", "a\u2028b", "\ud800", "a\u202eb"])
     def test_names_that_no_reader_takes_are_refused(self, tmp_path, name):
         with pytest.raises(InputError, match="without line breaks"):
             check_columns(["time_s", name])
@@ -61,4 +60,4 @@ class TestTables:
         assert json.loads((tmp_path / "x.json").read_text()) == {"a": [None, 1.0], "b": [None]}
 
     def test_markdown_and_comments(self):
-        assert markdown_cell("a|b\nc") == "a\\|b\\nc" and one_line("a\nb\u2028c") == "a\\nb\\u2028c"
+        assert markdown_cell("a|b\nc") == "a\\|b\\nc" and markdown_cell("a\nb\u2028c") == "a\\nb\\u2028c"
