@@ -9,11 +9,11 @@ def both_ends(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most // 2]} [...] {text[-most // 2 :]}"
 
 
-def printable(text: str) -> str:
-    """A text with escapes in place of what is not printed; line breaks stay."""
+def printable(text: str, kept: str = "") -> str:
+    """A text with escapes in place of what is not printed, but for the characters that are kept."""
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+    return "".join(c if c.isprintable() or c in kept else repr(c)[1:-1] for c in text)
 
 
 class DmsError(Exception):
@@ -23,7 +23,7 @@ class DmsError(Exception):
     """
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(both_ends(printable(message), MOST_CHARACTERS))
+        super().__init__(both_ends(printable(message, kept="\n"), MOST_CHARACTERS))
 
 
 class ModelError(DmsError, ValueError):

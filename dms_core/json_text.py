@@ -16,9 +16,9 @@ from typing import Any, TypeVar
 
 from pydantic import AfterValidator
 
-from dms_core.errors import InputError, both_ends
+from dms_core.errors import InputError, both_ends, printable
 from dms_core.input_file import decoded, read_bytes
-from dms_core.validation import Checked, on_one_line
+from dms_core.validation import Checked
 
 Kind = TypeVar("Kind", bound=Checked)
 MOST_BYTES = 64 << 20
@@ -97,7 +97,7 @@ def Each(kind: type[Checked]) -> AfterValidator:  # noqa: N802
 def brief(text: str, most: int = LONGEST_SENTENCE) -> str:
     """The first sentence of several lines, cut in its middle where it is long, without control characters."""
     first, *more = [line for line in text.splitlines() if line.strip()] or [""]
-    return both_ends(on_one_line(both_ends(first, most)), most) + (f" (and {len(more)} more)" if more else "")
+    return both_ends(printable(both_ends(first, most)), most) + (f" (and {len(more)} more)" if more else "")
 
 
 def finite(value: Any) -> Any:

@@ -12,11 +12,10 @@ from typing import IO, Any
 
 import numpy as np
 
-from dms_core.errors import InputError
+from dms_core.errors import InputError, printable
 from dms_core.json_text import finite
 from dms_core.output_place import Content, check_kind, put
 from dms_core.outputs import active_outputs
-from dms_core.validation import on_one_line
 
 DIGITS = ".12g"
 """Format of numbers in tables: more digits than any tolerance in use, fewer than rounding shows."""
@@ -137,4 +136,4 @@ def with_unit(name: str, unit: str) -> str:
 
 def markdown_cell(text: str) -> str:
     """A text as cell of a Markdown table: a bar would end it."""
-    return on_one_line(text).replace("|", "\\|")
+    return printable(text).replace("|", "\\|")

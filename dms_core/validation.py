@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
 
-from dms_core.errors import DmsError, InputError, both_ends, choices
+from dms_core.errors import DmsError, InputError, both_ends, choices, printable
 from dms_core.strict_types import strict
 
 _EXPECTED: dict[str, str] = {
@@ -178,18 +178,13 @@ def shown(value: Any) -> str:
 
 def cut(text: str, most: int = LONGEST) -> str:
     """A text on one line, or its beginning where it is longer than `most` characters."""
-    text = on_one_line(text[: most + 1])
+    text = printable(text[: most + 1])
     return text if len(text) <= most else f"{text[: most - 3]}..."
-
-
-def on_one_line(text: str) -> str:
-    """A text with escapes in place of line breaks and of all else that is not printed."""
-    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def _bounded(sentence: str) -> str:
     """A sentence, or both its ends: what is wrong stands at the beginning, what would be right at the end."""
-    return both_ends("\n".join(map(on_one_line, sentence.split("\n"))), LONGEST_SENTENCE)
+    return both_ends("\n".join(map(printable, sentence.split("\n"))), LONGEST_SENTENCE)
 
 
 def plain(value: Any) -> Any:

@@ -9,11 +9,10 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
-from dms_core.errors import InputError, counted
+from dms_core.errors import InputError, counted, printable
 from dms_core.json_text import brief
 from dms_core.output_file import markdown_cell, write_text
 from dms_core.outputs import Outputs
-from dms_core.validation import on_one_line
 from exo_env.patient.population import population, shipped_populations
 from exo_env.rendering.panels import require_matplotlib
 
@@ -164,7 +163,7 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
     if not worst["event"] and m.get("tracking_rms_deg") is not None:
         sentence = f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"
     return [
-        f"## Worst patient of {on_one_line(judged.title)}",
+        f"## Worst patient of {printable(judged.title)}",
         "",
         sentence,
         "",

@@ -16,10 +16,9 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
-from dms_core.errors import Stopped
+from dms_core.errors import Stopped, printable
 from dms_core.output_file import write_text
 from dms_core.outputs import OutputFile, Outputs, partial
-from dms_core.validation import on_one_line
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.tuning import MEASURED, POPULATION, Try, tunable, tune
@@ -123,8 +122,8 @@ class _Tried:
 def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
     """Best numbers of each policy, with where they are from."""
     lines = [
-        f"# Numbers of the baselines with the best mean return on '{on_one_line(population)}', found by",
-        f"#   {on_one_line(command)}",
+        f"# Numbers of the baselines with the best mean return on '{printable(population)}', found by",
+        f"#   {printable(command)}",
         f"# All tries stand in {TRIES}.",
     ]
     for name, ranked in tries.items():
@@ -136,7 +135,7 @@ def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
 def _table(tries: dict[str, list[Try]], command: str) -> str:
     """All tries, best first."""
     text = io.StringIO()
-    text.write(f"# {on_one_line(command)}; means over the patients\n")
+    text.write(f"# {printable(command)}; means over the patients\n")
     rows = csv.writer(text, lineterminator="\n")
     known = [m for m in MEASURED if all(m in one.measures for ranked in tries.values() for one in ranked)]
     rows.writerow(["policy", *known, "numbers"])

@@ -12,10 +12,9 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
-from dms_core.errors import Stopped, counted
+from dms_core.errors import Stopped, counted, printable
 from dms_core.output_file import write_text
 from dms_core.outputs import OutputFile, Outputs, partial
-from dms_core.validation import on_one_line
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.evaluate import check_numbers
@@ -101,7 +100,7 @@ def rows_of(results: list[Tried], repetitions: int) -> list[dict[str, float]]:
 def _table(rows: list[dict[str, float]], options: str) -> str:
     """Rows as CSV, below a line with the command."""
     text = io.StringIO()
-    text.write(f"# {PROGRAM} upper-bound {on_one_line(options)}\n")
+    text.write(f"# {PROGRAM} upper-bound {printable(options)}\n")
     writer = csv.DictWriter(text, rows[0], lineterminator="\n")
     writer.writeheader()
     writer.writerows({k: v if k in WHOLE else f"{v:.4g}" for k, v in row.items()} for row in rows)

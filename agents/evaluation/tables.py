@@ -9,9 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dms_core.errors import counted
+from dms_core.errors import counted, printable
 from dms_core.output_file import markdown_cell
-from dms_core.validation import on_one_line
 
 from ..environment import ENVIRONMENT
 from ..policies.baselines import POLICIES
@@ -93,8 +92,8 @@ def whole_table(results: Mapping[str, Any]) -> list[str]:
     """
     head, *rows = ([markdown_cell(cell) for cell in row] for row in table_rows(results))
     return [
-        f"## {on_one_line(heading(results))}", "", f"{statistic(results).capitalize()}.",
-        *map(on_one_line, left_out_lines(results)), "",
+        f"## {printable(heading(results))}", "", f"{statistic(results).capitalize()}.",
+        *map(printable, left_out_lines(results)), "",
         f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
     ]  # fmt: skip
 

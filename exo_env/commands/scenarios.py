@@ -74,7 +74,9 @@ def scenarios(
 
 def _flags(names: Sequence[str], runs: Sequence[ScenarioRun]) -> list[str]:
     """A line for each range that something left, such as a rope that pushes."""
-    return [f"  note   {name}: {flag.sentence}" for name, r in zip(names, runs, strict=True) for flag in r.trajectory.flags]
+    return [
+        f"  note   {name}: {flag.sentence}" for name, r in zip(names, runs, strict=True) for flag in r.trajectory.flags
+    ]
 
 
 def _declared(exercise: Path | None, files: Sequence[Path]) -> tuple[Exercise, list[str], list[Scenario]]:
