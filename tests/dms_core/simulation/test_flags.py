@@ -78,6 +78,19 @@ class TestRopes:
         assert options != SolverOptions() or run.lam.min() < -1e-4
 
     @pytest.mark.parametrize("options", ACCURACIES.values(), ids=ACCURACIES)
+    @pytest.mark.parametrize("mass", [1.0, 1e5])
+    def test_nor_is_a_rope_that_is_paid_out_with_gravity(self, mass, options):
+        """Its length is 1 m + 0.2 m sin(7 t), with 7^2 0.2 m = g: the tension m (g - psi'') touches 0 once a period."""
+        psi = Harmonic(offset=1.0, amplitude=0.2, frequency=np.sqrt(9.81 / 0.2) / (2.0 * np.pi))
+        system = System(
+            bodies=[PointMass(name="ball", mass=mass, position=(0.0, -1.0, 0.0))],
+            constraints=[RopeLength(name="cable", path=PATH, input="psi")],
+            forces=[Gravity(name="gravity", acceleration=(0.0, -9.81, 0.0))],
+            inputs=[Input(name="psi", signal=psi)],
+        )
+        assert simulate(system, 2.0, options).check().flags == ()
+
+    @pytest.mark.parametrize("options", ACCURACIES.values(), ids=ACCURACIES)
     @pytest.mark.parametrize("push", [-0.9, -0.01])
     def test_a_steady_push_is_flagged_whatever_peak_is_beside_it(self, push, options):
         """1000 N for 0.1 s, then -0.9 N or -0.01 N: less than a thousandth of the peak."""

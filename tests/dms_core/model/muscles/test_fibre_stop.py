@@ -20,6 +20,7 @@ from dms_core.model import (
     ThelenMuscle,
 )
 from dms_core.model.muscles.fibre import (
+    MUSCLE,
     STOP_WIDTH,
     fibre_at_rest,
     fibre_pull,
@@ -106,7 +107,7 @@ def _comes_to_rest(run: Trajectory, muscle: ThelenMuscle, error: float = 0.0) ->
     assert reached > 0 and fibre[reached:].max() < stop_begins(par) + error
     # A hundredth of the stop's width; the activation of the last step is that of the rest to rtol.
     assert fibre[-1] == pytest.approx(fibre_at_rest(par, APART, a), abs=0.01 * WIDTH)
-    assert abs(s.rate(FIBRE)[-1]) < 1e-2 * par[4] * STOP_WIDTH
+    assert abs(s.rate(FIBRE)[-1]) < 1e-2 * par[MUSCLE.fastest] * STOP_WIDTH
 
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
@@ -166,7 +167,7 @@ def test_runs_agree_with_a_tight_one(name):
 def test_the_row_lengthens_a_fibre_at_its_smallest_length(pennation, a):
     """By 3 vmax or more, as the head of `fibre.py` says: the row at that rate still asks for more."""
     par = np.array(_muscle(pennation_angle=pennation, start_fibre_length=None).numbers())
-    assert fibre_pull(par, smallest_fibre(par), 3.0 * par[4] * (1.0 - 1e-9), a)[0] <= 0.0
+    assert fibre_pull(par, smallest_fibre(par), 3.0 * par[MUSCLE.fastest] * (1.0 - 1e-9), a)[0] <= 0.0
 
 
 @pytest.mark.parametrize("pennation", PENNATION)
