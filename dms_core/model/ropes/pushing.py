@@ -8,7 +8,7 @@ from dms_core.model.element import Limit
 
 NO_TENSION = 1e-6
 """Tension that counts as 0 where it is solved for [N]: what rounding leaves of a slack rope."""
-LARGEST_ERROR = 1e-3
+LARGEST_ERROR = 1e-2
 """Share of a run's largest tension above which a negative one is flagged however coarse the run is."""
 
 

@@ -93,7 +93,7 @@ class TestRopes:
     @pytest.mark.parametrize("options", ACCURACIES.values(), ids=ACCURACIES)
     @pytest.mark.parametrize("push", [-0.9, -0.01])
     def test_a_steady_push_is_flagged_whatever_peak_is_beside_it(self, push, options):
-        """1000 N for 0.1 s, then -0.9 N or -0.01 N: less than a thousandth of the peak."""
+        """1000 N for 0.1 s, then -0.9 N or -0.01 N: a thousandth of the peak and less."""
         lag = FirstOrder(name="motor", time_constant=0.01, input="u", scale=10.0)
         system = System(
             bodies=[PointMass(name="ball", mass=1e3, position=(1.0, 0.0, 0.0))],
