@@ -12,8 +12,9 @@ curve does not see, so that the row stays an equation with derivatives in (q_m, 
 
 There fl and cos(alpha) keep their values of x = 0. Above, where x <= 0, there is no stop, and nothing changes. All
 slopes of the row scale with F0 a fl, on the stop and above, and with a slack tendon the row is linear where a fibre
-shortens too fast: Newton's method takes the kink in two iterations from either side, at any step. A fibre whose tendon
-is slack comes to rest where s is the rate at which it would shorten, (0.25 + 0.75 a) vmax: at x from 0.06 to 0.25.
+shortens too fast: Newton's method takes the kink in about two iterations from either side. A fibre whose tendon is
+slack comes to rest where s is the rate at which it would shorten, (0.25 + 0.75 a) vmax: at x from 0.06 to 0.25. Where
+its tendon becomes taut again a fixed step of 0.5 ms or more may fail, as it may without a stop.
 
 No solution goes below q_min. A tendon does not push, and fp is 0 below L0, so that fv >= 0 and the fibre shortens by
 itself at (0.25 + 0.75 a) vmax <= vmax at most: at q_min the row gives it a rate of 3 vmax or more, upwards. Nor does a
