@@ -110,7 +110,7 @@ class Limit(NamedTuple):
     """What is so below `low`: a clause whose subject is the element."""
     above: str = ""
     share: float = 0.0
-    """How far outside counts as rounding, over the largest size of the value in the run."""
+    """Largest error that a run may have in the value, over its largest size (`flags.py`); 0 for an exact value."""
 
 
 class Compositions(NamedTuple):

@@ -91,9 +91,9 @@ def steep_pennation() -> Example:
 
 
 def on_the_stop() -> Example:
-    """A fibre within the stop, 0.01 to 0.0101 L0, and beyond it: to the left of its kink; tendon slack."""
+    """A fibre within the stop, 0.01 to 0.02 L0, and beyond it: to the left of its kink; tendon slack."""
     muscle = _muscle(slack=50.0, pennation=0.0)
-    return _example(muscle, **_moving(muscle, (0.0090, 0.01006), (-0.2, -0.02)))
+    return _example(muscle, **_moving(muscle, (0.0090, 0.0198), (-0.2, -0.02)))
 
 
 def on_the_stop_by_pennation() -> Example:

@@ -22,9 +22,7 @@ from dms_core.model.geometry.path import (
     path_pattern,
     start_length,
 )
-
-NO_TENSION = 1e-6
-"""Tension [N], and share of the largest tension of a run, that counts as 0: what rounding leaves of a slack rope."""
+from dms_core.model.ropes.pushing import no_push
 
 
 @compiled
@@ -63,12 +61,8 @@ class RopeLength(Constraint):
 
     def limits(self) -> tuple[Limit, ...]:
         """A rope cannot push."""
-        return (
-            Limit(
-                "multiplier", f"{self.name}.length", "N", low=-NO_TENSION, share=NO_TENSION,
-                below="its tension was negative, where a real rope would be slack",
-            ),
-        )  # fmt: skip
+        said = "its tension was negative, where a real rope would be slack"
+        return no_push("multiplier", f"{self.name}.length", said)
 
     def place(self, system) -> Placement:
         """Bodies at the ends of the segments that cross from one body to another."""

@@ -5,14 +5,22 @@ A fibre has a smallest length, as in OpenSim (MuscleFixedWidthPennationModel, Mi
     q_min = max(0.01 L0, L0 sin(alpha0) / sin(acos 0.1))
 
 There OpenSim sets the rate of the fibre to 0 as long as it would shorten; its tendon pulls with what its own length
-gives. Here a stop within 1e-4 L0 above q_min takes the fibre's force instead, so that the row stays an equation with a
-derivative in (q_m, qdot_m):
+gives. Here a stop within w = 1e-2 L0 above q_min lengthens the fibre at a rate s of its own, which the force-velocity
+curve does not see, so that the row stays an equation with derivatives in (q_m, qdot_m):
 
-    F0 (a fl fv + fp) cos(alpha) - sigma - stop(q_m) = 0,   stop = 4 F0 x,   x = (q_min + 1e-4 L0 - q_m) / (1e-4 L0)
+    F0 (a fl fv(qdot_m - s(q_m)) + fp) cos(alpha) - sigma = 0,   s = 4 vmax x,   x = (q_min + w - q_m) / w
 
-and 0 above it, where nothing changes. A fibre at rest below its optimal length gives at most F0, so that it comes to
-rest above q_min, at rate 0; only the tendon's force acts on the bodies. Newton's method takes the kink in one iteration
-from either side, where a rounded one costs it many.
+There fl and cos(alpha) keep their values of x = 0. Above, where x <= 0, there is no stop, and nothing changes. All
+slopes of the row scale with F0 a fl, on the stop and above, and with a slack tendon the row is linear where a fibre
+shortens too fast: Newton's method takes the kink in about two iterations from either side. A fibre whose tendon is
+slack comes to rest where s is the rate at which it would shorten, (0.25 + 0.75 a) vmax: at x from 0.06 to 0.25. Where
+its tendon becomes taut again a fixed step of 0.5 ms or more may fail, as it may without a stop.
+
+No solution goes below q_min. A tendon does not push, and fp is 0 below L0, so that fv >= 0 and the fibre shortens by
+itself at (0.25 + 0.75 a) vmax <= vmax at most: at q_min the row gives it a rate of 3 vmax or more, upwards. Nor does a
+step of any size end there: BDF2 would need a rate below r / (1 + r) vmax <= 0.71 vmax at q_min, where r is the ratio of
+two steps, and the second stage of SDIRK2 one below (1 - 2 gamma) / gamma vmax = 1.42 vmax. (The exception is a fibre
+that passive force shortens many times faster than vmax within a single step.)
 """
 
 from __future__ import annotations
@@ -28,10 +36,10 @@ LEAST_COSINE = 0.1
 """Pennation is not let beyond acos(0.1), about 84 degrees."""
 SHORTEST = 0.01
 """Smallest length of a fibre over L0, where pennation asks for no more."""
-STOP_WIDTH = 1e-4
-"""Way above the smallest length within which the stop takes the fibre's force, over L0."""
-STOP_FORCE = 4.0
-"""The stop's force at the smallest length, over F0: a fibre that is stretched from there gives more than F0."""
+STOP_WIDTH = 1e-2
+"""Way above the smallest length within which the stop acts, over L0."""
+STOP_RATE = 4.0
+"""Rate that the stop gives at the smallest length, over the contraction velocity: 2.42 or more, see the head."""
 MOST_TRIALS = 200
 """Evaluations after which a search for a zero is as good as it gets."""
 
@@ -86,14 +94,20 @@ def smallest_fibre(par):
 
 
 @compiled
+def stop_begins(par):
+    """Length below which the stop acts [m]."""
+    return smallest_fibre(par) + STOP_WIDTH * par[MUSCLE.L0]
+
+
+@compiled
 def fibre_stop(par, fibre):
-    """(force along the tendon with which the stop holds the fibre [N], its slope by q_m [N/m]); 0 above the stop."""
+    """(rate s at which the stop lengthens the fibre [m/s], its slope by q_m [1/s]); 0 above the stop."""
     width = STOP_WIDTH * par[MUSCLE.L0]
-    x = (smallest_fibre(par) + width - fibre) / width
+    x = (stop_begins(par) - fibre) / width
     if x <= 0.0:
         return 0.0, 0.0
-    F = STOP_FORCE * par[MUSCLE.F0]
-    return F * x, -F / width
+    fastest = STOP_RATE * par[MUSCLE.fastest]
+    return fastest * x, -fastest / width
 
 
 @compiled
@@ -108,7 +122,7 @@ def tendon_state(par, length, fibre):
 
 @compiled
 def fibre_state(par, fibre, rate, a):
-    """Active and passive fibre force [N]; derivatives of the active by q_m, its rate and a, of the passive by q_m."""
+    """Forces of a fibre without its stop: active and passive [N]; derivatives as in `held_fibre_state`."""
     F0, L0, fastest = par[MUSCLE.F0], par[MUSCLE.L0], par[MUSCLE.fastest]
     fl, fl_l = active_force(fibre / L0, par[MUSCLE.active_shape])
     fp, fp_l = passive_force(fibre / L0, par[MUSCLE.passive_shape], par[MUSCLE.passive_strain])
@@ -124,20 +138,44 @@ def fibre_state(par, fibre, rate, a):
 
 
 @compiled
+def held_fibre_state(par, fibre, rate, a):
+    """Active and passive fibre force [N]; derivatives of the active by q_m, its rate and a, of the passive by q_m."""
+    stop, stop_l = fibre_stop(par, fibre)
+    active, passive, by_l, by_v, by_a, passive_l = fibre_state(par, fibre, rate - stop, a)
+    if stop > 0.0:
+        active, _, _, by_v, by_a, _ = fibre_state(par, stop_begins(par), rate - stop, a)
+        by_l = -by_v * stop_l
+    return active, passive, by_l, by_v, by_a, passive_l
+
+
+@compiled
+def fibre_pull(par, fibre, rate, a):
+    """Force of the fibre along the tendon [N]; its derivatives by q_m, its rate and a."""
+    active, passive, by_l, by_v, by_a, passive_l = held_fibre_state(par, fibre, rate, a)
+    top = stop_begins(par)
+    if fibre < top:
+        c, c_l = pennation_cosine(par, top)[0], 0.0
+    else:
+        c, c_l = pennation_cosine(par, fibre)
+    return (active + passive) * c, (by_l + passive_l) * c + (active + passive) * c_l, by_v * c, by_a * c
+
+
+@compiled
 def surplus(par, length, fibre, a):
-    """Force of a fibre at rest along the tendon, less that of the tendon [N]."""
+    """Force along the tendon of a fibre at rest, its stop left out, less that of the tendon [N]."""
     active, passive = fibre_state(par, fibre, 0.0, a)[:2]
     return (active + passive) * pennation_cosine(par, fibre)[0] - tendon_state(par, length, fibre)[0]
 
 
 @compiled
-def _rest_on_stop(par, length, a, low, high):
-    """Fibre length [m] between low and high at which the stop holds what the tendon does not, to rounding."""
+def _rest_on_stop(par, length, a):
+    """Fibre length [m] on the stop at which it pulls as much as the tendon, to rounding."""
+    low, high = smallest_fibre(par), stop_begins(par)
     for _ in range(MOST_TRIALS):
         x = 0.5 * (low + high)
         if not low < x < high:
             break
-        if surplus(par, length, x, a) > fibre_stop(par, x)[0]:
+        if fibre_pull(par, x, 0.0, a)[0] > tendon_state(par, length, x)[0]:
             high = x
         else:
             low = x
@@ -146,15 +184,14 @@ def _rest_on_stop(par, length, a, low, high):
 
 @compiled
 def fibre_at_rest(par, length, a):
-    """Fibre length [m] at which `surplus` is 0, to rounding; on the stop where the tendon leaves no more room."""
+    """Fibre length [m] at which the fibre row is 0 at rate 0, to rounding; on the stop where there is no more room."""
     height, room = par[MUSCLE.height], length - par[MUSCLE.Ls]
-    stop = smallest_fibre(par)
-    top = stop + STOP_WIDTH * par[MUSCLE.L0]
+    top = stop_begins(par)
     low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[MUSCLE.L0]) * (1.0 + 1e-12)
     # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
     high = math.hypot(max(room, 0.0), height)
     if high <= top or surplus(par, length, top, a) >= 0.0:
-        return _rest_on_stop(par, length, a, stop, top)
+        return _rest_on_stop(par, length, a)
     f_low, f_high, moved = surplus(par, length, low, a), surplus(par, length, high, a), 0.0
     if f_low >= 0.0:
         low, f_low = top, surplus(par, length, top, a)

@@ -13,7 +13,7 @@ u is an input, or an input plus gain x, where x is a coordinate of another eleme
 The fibre's height L0 sin(alpha0) is constant; cos(alpha) is not let below 0.1. With the force-velocity curve inverted
 in closed form the fibre row holds q_m and its rate directly, without an inner iteration.
 
-A fibre has a smallest length, where a stop takes its force (fibre.py).
+A fibre has a smallest length, which a stop keeps it above (fibre.py).
 """
 
 from __future__ import annotations
@@ -42,10 +42,9 @@ from dms_core.model.muscles.fibre import (
     MUSCLE,
     STOP_WIDTH,
     fibre_at_rest,
-    fibre_state,
-    fibre_stop,
-    pennation_cosine,
+    fibre_pull,
     smallest_fibre,
+    stop_begins,
     tendon_state,
 )
 from dms_core.model.muscles.thelen_curves import ThelenCurves
@@ -85,9 +84,7 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     length = add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, r)
     act, _ = muscle_activation(ip, q, u)
     sigma, s_l, s_m = tendon_state(par, length, q[m])
-    active, passive, by_l, by_v, by_a, passive_l = fibre_state(par, q[m], v[m], act)
-    c, c_l = pennation_cosine(par, q[m])
-    stop, stop_l = fibre_stop(par, q[m])
+    pull, by_m, by_rate, by_a = fibre_pull(par, q[m], v[m], act)
     if level > 0:
         add_path_hessian(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, sigma, Jq)
         for i in range(m):
@@ -95,17 +92,13 @@ def thelen_muscle(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
                 Jq[i, j] += s_l * r[i] * r[j]
             Jq[i, m] = s_m * r[i]
             Jq[m, i] = -s_l * r[i]
-        Jq[m, m] = (by_l + passive_l) * c + (active + passive) * c_l - s_m
-        if stop > 0.0:
-            Jq[m, m] -= stop_l
-        Jv[m, m] = by_v * c
+        Jq[m, m] = by_m - s_m
+        Jv[m, m] = by_rate
         if ip[0] > 0:
-            Jq[m, m + 1] = by_a * c
+            Jq[m, m + 1] = by_a
     for i in range(m):
         r[i] *= sigma
-    r[m] = (active + passive) * c - sigma
-    if stop > 0.0:
-        r[m] -= stop
+    r[m] = pull - sigma
     if ip[0] > 0:
         excitation, by_reflex = muscle_excitation(ip, par, q, u)
         rate, rate_a, rate_u = activation_rate(
@@ -125,8 +118,7 @@ def thelen_muscle_by_input(ip, par, q, v, a, u, Ju):
     m = ip[1]
     act, by_input = muscle_activation(ip, q, u)
     if ip[0] == 0:
-        by_activation = fibre_state(par, q[m], v[m], act)[4]
-        Ju[m, 0, 0] = by_activation * pennation_cosine(par, q[m])[0] * by_input
+        Ju[m, 0, 0] = fibre_pull(par, q[m], v[m], act)[3] * by_input
         return
     wanted = u[0, 0] + par[MUSCLE.reflex_gain] * q[m + 2] if ip[0] > 1 else u[0, 0]
     excitation, inside = limited(wanted)
@@ -228,12 +220,13 @@ class ThelenMuscle(Force):
 
     def limits(self) -> tuple[Limit, ...]:
         """Fibre between its stop and the strain at which the passive curve is F0, through which Thelen fits it."""
-        stop = self.smallest_fibre_length + STOP_WIDTH * self.optimal_fibre_length
         return (
             Limit(
-                "coordinate", f"{self.name}.fibre_length", "m", low=stop,
+                "coordinate", f"{self.name}.fibre_length", "m",
+                low=float(stop_begins(np.array(self.numbers()))),
                 high=self.optimal_fibre_length * (1.0 + self.curves.passive_strain),
-                below=f"a stop held its fibre at the smallest length, {self.smallest_fibre_length:.4g} m",
+                below=f"a stop held its fibre within {STOP_WIDTH:g} L0 of the smallest length, "
+                f"{self.smallest_fibre_length:.4g} m",
                 above="its fibre was longer than (1 + passive_strain) L0, where the passive force is F0",
             ),
         )  # fmt: skip

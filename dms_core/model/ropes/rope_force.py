@@ -10,15 +10,12 @@ from pydantic import Field, model_validator
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Force, Limit, Pattern, Placement
 from dms_core.model.geometry.path import PathPoint, add_path_gradient, add_path_hessian, moving_path, path_pattern
+from dms_core.model.ropes.pushing import no_push
 
 CONSTANT, INPUT, COORDINATE = 0, 1, 2
 """Where the tension comes from: first integer of the table."""
 PATH_INTEGERS, PATH_NUMBERS = 2, 1
 """Indices in `ip` and `par` where the path begins."""
-NO_TENSION = 1e-6
-"""Tension that counts as 0 [N]."""
-UNDERSHOOT = 1e-3
-"""Share of a run's largest tension by which a coordinate may fall below 0: the error of its equation."""
 
 
 @compiled
@@ -86,10 +83,10 @@ class RopeForce(Force):
         """A rope cannot push: a negative input counts as 0, a coordinate is taken as it is."""
         if self.input is not None:
             said = f"its tension, input '{self.input}', was negative; it pulled nothing, as a rope cannot push"
-            return (Limit("input", self.input, "N", low=-NO_TENSION, below=said),)
+            return no_push("input", self.input, said)
         if self.coordinate is not None:
             said = f"its tension, coordinate '{self.coordinate}', was negative; it pushed, which no rope can"
-            return (Limit("coordinate", self.coordinate, "N", low=-NO_TENSION, below=said, share=UNDERSHOOT),)
+            return no_push("coordinate", self.coordinate, said)
         return ()
 
     def place(self, system) -> Placement:

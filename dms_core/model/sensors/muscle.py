@@ -14,15 +14,8 @@ from pydantic import Field, field_validator
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.geometry.path import add_path_gradient, add_path_rate_gradient, path_length, path_rate
-from dms_core.model.muscles.muscle import (
-    PATH_INTEGERS,
-    PATH_NUMBERS,
-    ThelenMuscle,
-    fibre_state,
-    muscle_activation,
-    pennation_cosine,
-    tendon_state,
-)
+from dms_core.model.muscles.fibre import held_fibre_state, pennation_cosine, tendon_state
+from dms_core.model.muscles.muscle import PATH_INTEGERS, PATH_NUMBERS, ThelenMuscle, muscle_activation
 
 UNITS = {
     "length": "m",
@@ -91,7 +84,7 @@ def _active_component(k, code, ip, par, q, v, u, level, y, Yq, Yv, Yu):
     act, by_input = muscle_activation(ip, q, u)
     y[k], by_a = act, 1.0
     if code == ACTIVE_FORCE:
-        y[k], _, by_l, by_v, by_a, _ = fibre_state(par, q[m], v[m], act)
+        y[k], _, by_l, by_v, by_a, _ = held_fibre_state(par, q[m], v[m], act)
         if level > 0:
             Yq[k, m] = by_l
             Yv[k, m] = by_v
@@ -113,7 +106,7 @@ def _fibre_component(k, code, ip, par, q, v, level, y, Yq, Yv):
         return
     y[k], slope = q[m], 1.0
     if code == PASSIVE_FORCE:
-        _, y[k], _, _, _, slope = fibre_state(par, q[m], v[m], 0.0)
+        _, y[k], _, _, _, slope = held_fibre_state(par, q[m], v[m], 0.0)
     elif code == PENNATION:
         c, c_l = pennation_cosine(par, q[m])
         s = math.sqrt(1.0 - c * c)

@@ -6,8 +6,8 @@ import pytest
 from dms_core.errors import ModelError
 from dms_core.model.element import GROUND
 from dms_core.model.geometry.path import PathPoint, path_length
-from dms_core.model.muscles.fibre import STOP_WIDTH, fibre_at_rest, fibre_stop, surplus
-from dms_core.model.muscles.muscle import PATH_INTEGERS, PATH_NUMBERS, pennation_cosine, thelen_muscle
+from dms_core.model.muscles.fibre import STOP_WIDTH, fibre_at_rest, fibre_pull, pennation_cosine
+from dms_core.model.muscles.muscle import PATH_INTEGERS, PATH_NUMBERS, thelen_muscle
 from tests.arm26 import MUSCLES, arm, body_coordinates, muscle, table
 
 FORCE, LENGTH = 1e-3, 1e-8
@@ -141,8 +141,8 @@ def test_a_fibre_without_room_rests_on_its_stop(length):
     par = np.array(m.numbers())
     fibre = fibre_at_rest(par, length, 0.5)
     assert m.smallest_fibre_length < fibre < m.smallest_fibre_length + STOP_WIDTH * m.optimal_fibre_length
-    # The stop holds what the fibre pulls more than its tendon; 4 F0 over 1e-4 L0 is 2e8 N/m, and rounding 1e-18 m.
-    assert surplus(par, length, fibre, 0.5) == pytest.approx(fibre_stop(par, fibre)[0], abs=1e-6)
+    # The row's slope there is some 1e6 N/m, of an argument that is rounded to 1e-18 m.
+    assert fibre_pull(par, fibre, 0.0, 0.5)[0] == pytest.approx(m.tension(length, fibre), abs=1e-9)
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-4, 10.0])
