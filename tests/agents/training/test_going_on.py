@@ -227,7 +227,6 @@ def test_what_is_no_training_gets_no_lock(tmp_path):
 
 
 def test_a_sweep_goes_on_by_the_same_rules(run):
-    pytest.importorskip("ray")
     from agents.distributed.sweep import train_share
     from agents.training.config import Config
     from dms_core.errors import InputError
