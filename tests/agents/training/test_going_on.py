@@ -224,3 +224,21 @@ def test_what_is_no_training_gets_no_lock(tmp_path):
     config = config_file(tmp_path)
     assert main(["train", "--config", str(config), "--out", str(tmp_path)]) == 2
     assert [p.name for p in tmp_path.iterdir()] == [config.name]
+
+
+def test_a_sweep_goes_on_by_the_same_rules(run):
+    from agents.distributed.sweep import train_share
+    from agents.training.config import Config
+    from dms_core.errors import InputError
+
+    file = run / "config.yml"
+    config = Config.read(file).content()
+    with RunFolder(run).locked():
+        before = content(run)
+        with pytest.raises(InputError, match="another process is training"):
+            train_share(config, 0, str(run))
+        assert content(run) == before
+    assert train_share(config, 0, str(run))["steps"] <= 32
+    file.write_text(file.read_text().replace("gamma: 0.98", "gamma: 0.9"))
+    with pytest.raises(InputError, match="gamma was 0.98 and is 0.9"):
+        train_share(config, 0, str(run))

@@ -59,7 +59,7 @@ def test_a_device_of_ones_own_and_another_drive(tmp_path, capsys):
         (["--seed", "-1"], "--seed -1: expected a whole number from 0"),
         (["--env", "exo/Nothing-v0"], "environment 'exo/Nothing-v0' is not registered. There are: exo/ElbowLift-v1"),
         (["--env", "no_such_module:a/B-v0"], "module 'no_such_module' cannot be imported"),
-        (["--env", "CartPole-v1"], "env = 'CartPole-v1': expected an environment that is an AssistanceEnv"),
+        (["--env", "CartPole-v1"], "environment 'CartPole-v1' is a CartPoleEnv: expected one built on AssistanceEnv"),
         (["--exoskeleton", "leg"], "exoskeleton = 'leg': expected one of elbow"),
     ],
 )
