@@ -149,6 +149,10 @@ class RopeActuator(Force):
                 f"max_tension = {self.max_tension} N must exceed pretension = {self.pretension} N by at least the "
                 f"width = {self.width} N of the smoothing"
             )
+        if self.max_tension is not None and (self.start_tension or 0.0) > self.max_tension:
+            raise ValueError(
+                f"start_tension = {self.start_tension} N: Expected at most max_tension = {self.max_tension} N"
+            )
         return self
 
     def coordinates(self) -> tuple[Coordinate, ...]:

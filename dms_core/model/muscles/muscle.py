@@ -219,7 +219,7 @@ class ThelenMuscle(Force):
         return self.optimal_fibre_length * (1.0 + self.curves.passive_strain * exponent / k)
 
     def limits(self) -> tuple[Limit, ...]:
-        """Fibre between its stop and the strain at which the passive curve is F0, through which Thelen fits it."""
+        """Excitation in 0..1; fibre between its stop and the strain at which the passive curve is F0, as Thelen fits it."""
         return (
             Limit(
                 "coordinate", f"{self.name}.fibre_length", "m",
@@ -228,6 +228,11 @@ class ThelenMuscle(Force):
                 below=f"a stop held its fibre within {STOP_WIDTH:g} L0 of the smallest length, "
                 f"{self.smallest_fibre_length:.4g} m",
                 above="its fibre was longer than (1 + passive_strain) L0, where the passive force is F0",
+            ),
+            Limit(
+                "input", self.excitation, "-", low=0.0, high=1.0,
+                below=f"its excitation, input '{self.excitation}', was below 0 and counted as {MINIMUM:g}",
+                above=f"its excitation, input '{self.excitation}', was above 1 and counted as 1",
             ),
         )  # fmt: skip
 

@@ -227,6 +227,14 @@ class TestFibres:
         assert "longer than (1 + passive_strain) L0" in flag.sentence and flag.first == 0.0
         assert 0.17 <= flag.worst < 0.2
 
+    @pytest.mark.parametrize(("u", "said"), [(3.0, "above 1 and counted as 1"), (-1.0, "below 0 and counted as 0.01")])
+    def test_an_excitation_that_is_limited(self, u, said):
+        system = _muscle(path=PATH)
+        ball = PointMass(name="ball", mass=1e6, position=(0.36, 0.0, 0.0))
+        system = System(bodies=[ball], forces=system.forces, inputs=[Input(name="u", signal=Constant(value=u))])
+        (flag,) = simulate(system, 0.02).check().flags
+        assert said in flag.sentence and flag.worst == u and flag.total == pytest.approx(0.02)
+
     def test_a_slack_tendon_is_no_leaving(self):
         run = simulate(_muscle(), 0.02).check()
         assert run.flags == ()
