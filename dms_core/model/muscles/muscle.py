@@ -219,7 +219,7 @@ class ThelenMuscle(Force):
         return self.optimal_fibre_length * (1.0 + self.curves.passive_strain * exponent / k)
 
     def limits(self) -> tuple[Limit, ...]:
-        """Excitation in 0..1; fibre between its stop and the strain at which the passive curve is F0, as Thelen fits it."""
+        """Excitation in 0..1; fibre between its stop and the strain at which the passive curve is F0 (Thelen)."""
         return (
             Limit(
                 "coordinate", f"{self.name}.fibre_length", "m",
