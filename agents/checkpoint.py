@@ -13,9 +13,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dms_core.errors import InputError
-from dms_core.input_file import decoded, digest, read_bytes
-from dms_core.json_text import brief, read_json
-from dms_core.output_file import write_text
+from dms_core.files.input_file import decoded, digest, read_bytes
+from dms_core.files.json_text import brief, read_json
+from dms_core.files.output_file import write_text
 
 POINTER, HASHES = "latest", "hashes.json"
 LONGEST_NAME, MOST_HASHES = 1 << 12, 1 << 20

@@ -19,10 +19,10 @@ from tyro.conf import Positional, arg
 from dms_core import Model, Simulation, SolverOptions, Trajectory
 from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_command
 from dms_core.errors import DmsError, InputError, Stopped
+from dms_core.files.output_file import check_columns, check_size, with_unit, write_csv, write_json, write_text
+from dms_core.files.output_place import descriptor
+from dms_core.files.outputs import OutputFile, Outputs, partial
 from dms_core.model_file import load
-from dms_core.output_file import check_columns, check_size, with_unit, write_csv, write_json, write_text
-from dms_core.output_place import descriptor
-from dms_core.outputs import OutputFile, Outputs, partial
 from dms_core.results import Result, States
 from dms_core.schema import reference
 

@@ -19,7 +19,7 @@ from tqdm import tqdm
 from tyro.constructors import PrimitiveConstructorSpec
 
 from dms_core.errors import DmsError, InputError, ModelWarning
-from dms_core.output_place import REMEDIES
+from dms_core.files.output_place import REMEDIES
 
 USER_MISTAKE, FAILED_RUN, STOPPED = 2, 1, 130
 """Exit statuses."""

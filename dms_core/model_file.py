@@ -19,13 +19,13 @@ from pydantic import BaseModel
 import dms_core.model  # noqa: F401  (makes every kind known)
 from dms_core.assembly.layout import Layout
 from dms_core.errors import DmsError, InputError, ModelError, choices
+from dms_core.files.yaml_builder import Section
+from dms_core.files.yaml_text import read_yaml, yaml_of
 from dms_core.model.constraints.euler_norm import EulerNorm
 from dms_core.model.element import Body, Constraint, Declaration, Force, Sensor
 from dms_core.model.signals import Function, Input
 from dms_core.model.system import System
 from dms_core.validation import cut, shown
-from dms_core.yaml_builder import Section
-from dms_core.yaml_text import read_yaml, yaml_of
 
 BRANCHES: dict[str, type[Declaration]] = {
     "bodies": Body,

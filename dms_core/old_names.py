@@ -13,5 +13,7 @@ MOVED = {
     "model.rotations": "model.geometry.rotations",
     "model.sensed_angle": "model.geometry.sensed_angle",
     "model.separation": "model.geometry.separation",
+    "output_file": "files.output_file",
     "simulation.initial_conditions": "assembly.start",
+    "yaml_text": "files.yaml_text",
 }

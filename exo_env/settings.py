@@ -8,8 +8,8 @@ from typing import Any, Self
 
 from dms_core.config_files import config_file
 from dms_core.errors import InputError
+from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import Checked, plain, shown
-from dms_core.yaml_text import read_yaml
 
 
 class Settings(Checked):

@@ -1,4 +1,4 @@
-"""All three packages write files in one way, `dms_core.output_file`: what does not is found in their sources."""
+"""All three packages write files in one way, `dms_core.files.output_file`: what does not is found in their sources."""
 
 import ast
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ALLOWED = {
-    "dms_core/output_place.py": {
+    "dms_core/files/output_place.py": {
         "os.fdopen",
         "open",
         "os.replace",
@@ -17,11 +17,11 @@ ALLOWED = {
         "mkdir",
         "unlink",
     },
-    "dms_core/outputs.py": {"tempfile.mkdtemp", "unlink", "rmdir"},
+    "dms_core/files/outputs.py": {"tempfile.mkdtemp", "unlink", "rmdir"},
     # Nowhere, for streams that are closed.
     "dms_core/command_line.py": {"open"},
     # Gives the text.
-    "dms_core/yaml_text.py": {"yaml.dump"},
+    "dms_core/files/yaml_text.py": {"yaml.dump"},
     # Folders that appear whole: their files are written in the one way, then the folder takes its name.
     "agents/checkpoint.py": {"mkdir", "rename", "shutil.rmtree"},
     # The lock of a folder, which must stay the same file.
@@ -75,7 +75,7 @@ def test_nothing_writes_in_another_way(package):
         others = set(calls(path.read_text(encoding="utf-8"))) - ALLOWED.get(name, set())
         if others:
             found[name] = others
-    assert found == {}, "write with dms_core.output_file, or say in ALLOWED why not"
+    assert found == {}, "write with dms_core.files.output_file, or say in ALLOWED why not"
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import DmsError, InputError, Stopped, counted
-from dms_core.output_file import write_json, write_text
-from dms_core.outputs import Outputs, partial
+from dms_core.files.output_file import write_json, write_text
+from dms_core.files.outputs import Outputs, partial
 from exo_env.rendering.panels import require_matplotlib
 
 from ..environment import ENVIRONMENT, environment_id

@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, extra
-from dms_core.outputs import Outputs
+from dms_core.files.outputs import Outputs
 
 from ..environment import ENVIRONMENT
 from ..export.model_zip import from_zip

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
-from dms_core.json_text import brief, parse_json
+from dms_core.files.json_text import brief, parse_json
 
 from ..checkpoint import Store
 from ..policies.learned import DESCRIPTION, SHIPPED, LearnedPolicy, find_policy, repetitions_of, shipped_policies

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
-from dms_core.json_text import brief
+from dms_core.files.json_text import brief
 
 from ..environment import check_settings
 from ..evaluation.evaluate import differences

@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from dms_core.command_line import FolderOut
 from dms_core.errors import Stopped
-from dms_core.output_place import check_folder
+from dms_core.files.output_place import check_folder
 
 from ..distributed.cluster import share_out
 from ..distributed.sweep import planned, steps_of, train_share

@@ -17,8 +17,8 @@ from tyro.conf import arg
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
 from dms_core.errors import Stopped, printable
-from dms_core.output_file import write_text
-from dms_core.outputs import OutputFile, Outputs, partial
+from dms_core.files.output_file import write_text
+from dms_core.files.outputs import OutputFile, Outputs, partial
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.tuning import MEASURED, POPULATION, Try, tunable, tune

@@ -13,8 +13,8 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import Stopped, counted, printable
-from dms_core.output_file import write_text
-from dms_core.outputs import OutputFile, Outputs, partial
+from dms_core.files.output_file import write_text
+from dms_core.files.outputs import OutputFile, Outputs, partial
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.evaluate import check_numbers

@@ -13,8 +13,8 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import DmsError, InputError, Stopped, extra
-from dms_core.output_file import write_bytes
-from dms_core.outputs import OutputFile, Outputs
+from dms_core.files.output_file import write_bytes
+from dms_core.files.outputs import OutputFile, Outputs
 from exo_env.patient.population import population
 
 from ..environment import ENVIRONMENT, environment_id

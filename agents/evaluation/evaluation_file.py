@@ -12,7 +12,7 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, FailFast, Field, model_validator
 
 from dms_core.errors import InputError
-from dms_core.json_text import Each, brief, checked, read_json
+from dms_core.files.json_text import Each, brief, checked, read_json
 from dms_core.validation import Checked
 
 from .evaluate import VERSION

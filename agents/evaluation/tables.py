@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import counted, printable
-from dms_core.output_file import markdown_cell
+from dms_core.files.output_file import markdown_cell
 
 from ..environment import ENVIRONMENT
 from ..policies.baselines import POLICIES

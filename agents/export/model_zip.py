@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import DmsError, InputError
-from dms_core.input_file import opened
-from dms_core.json_text import brief
+from dms_core.files.input_file import opened
+from dms_core.files.json_text import brief
 
 from ..environment import ENVIRONMENT, environment_id, make
 from ..policies.learned import LearnedPolicy

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import DmsError, extra
-from dms_core.output_file import write_bytes
+from dms_core.files.output_file import write_bytes
 
 from ..policies.learned import LearnedPolicy
 from ..policies.network import Architecture

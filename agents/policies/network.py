@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import FailFast, Field, model_validator
 
 from dms_core.errors import InputError
-from dms_core.json_text import brief
+from dms_core.files.json_text import brief
 from exo_env.settings import Settings
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {

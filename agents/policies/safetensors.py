@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import FailFast, Field
 
 from dms_core.errors import InputError
-from dms_core.json_text import brief, checked, parse_json
+from dms_core.files.json_text import brief, checked, parse_json
 from dms_core.validation import Checked
 
 TYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "U8": "|u1"}

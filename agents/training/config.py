@@ -22,8 +22,8 @@ from typing import Annotated, Any, Self
 from pydantic import Field
 
 from dms_core.errors import InputError, choices
+from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import shown
-from dms_core.yaml_text import read_yaml
 from exo_env.settings import Settings
 
 from .config_file import SAME_SETTINGS, TRAINING, check_wrapper, chosen, override_values, sections

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dms_core.errors import InputError, choices
+from dms_core.files.yaml_builder import MOST_DEPTH
+from dms_core.files.yaml_text import read_value
 from dms_core.validation import cut, shown
-from dms_core.yaml_builder import MOST_DEPTH
-from dms_core.yaml_text import read_value
 
 from ..environment import ENVIRONMENT, environment_id, environments
 from .rl_zoo_text import read_call

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError, choices
-from dms_core.json_text import finite
+from dms_core.files.json_text import finite
+from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import cut, shown
-from dms_core.yaml_text import read_yaml
 
 from .config import Config, Training
 from .config_file import TRAINING

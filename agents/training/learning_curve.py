@@ -12,7 +12,7 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from dms_core.errors import InputError
-from dms_core.output_file import write_json, write_text
+from dms_core.files.output_file import write_json, write_text
 
 from ..environment import make, patient_seeds
 from ..policies.learned import LearnedPolicy

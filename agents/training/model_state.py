@@ -21,9 +21,9 @@ from stable_baselines3.common.save_util import load_from_zip_file, recursive_set
 from stable_baselines3.common.vec_env import VecNormalize
 
 from dms_core.errors import InputError
-from dms_core.input_file import opened
-from dms_core.json_text import brief
-from dms_core.output_file import write_bytes, write_file
+from dms_core.files.input_file import opened
+from dms_core.files.json_text import brief
+from dms_core.files.output_file import write_bytes, write_file
 
 MODEL, STATISTICS, REPLAY, RANDOM = "model.zip", "statistics.npz", "replay.npz", "random.npz"
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")

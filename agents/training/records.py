@@ -15,7 +15,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, ConfigDict, FailFast, Field
 
 from dms_core.errors import InputError
-from dms_core.json_text import Each, checked, read_json
+from dms_core.files.json_text import Each, checked, read_json
 from dms_core.validation import Checked
 
 from ..policies.learned import fingerprint

@@ -16,8 +16,8 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dms_core.errors import DmsError
-from dms_core.output_file import write_text
-from dms_core.output_place import cannot
+from dms_core.files.output_file import write_text
+from dms_core.files.output_place import cannot
 
 from ..policies.learned import LearnedPolicy
 from .algorithms import build

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
-from dms_core.output_file import write_json, write_text
-from dms_core.output_place import check_writable
-from dms_core.yaml_text import yaml_of
+from dms_core.files.output_file import write_json, write_text
+from dms_core.files.output_place import check_writable
+from dms_core.files.yaml_text import yaml_of
 
 from ..checkpoint import Store
 from ..environment import environment_id

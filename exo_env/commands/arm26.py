@@ -9,9 +9,9 @@ from pathlib import Path
 from dms_core import Simulation, SolverOptions
 from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves
 from dms_core.errors import InputError, Stopped
+from dms_core.files.output_file import check_size, write_csv
+from dms_core.files.outputs import OutputFile, Outputs, partial
 from dms_core.model.muscles.activation import MINIMUM
-from dms_core.output_file import check_size, write_csv
-from dms_core.outputs import OutputFile, Outputs, partial
 from dms_core.results import Result
 from exo_env.ecosystem import bare_arm as bare
 

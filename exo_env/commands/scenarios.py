@@ -12,9 +12,9 @@ from tyro.conf import arg
 from dms_core import SolverOptions
 from dms_core.command_line import FAILED_RUN, FolderOut, moves
 from dms_core.errors import InputError, Stopped
+from dms_core.files.output_file import write_csv, write_json
+from dms_core.files.outputs import Outputs
 from dms_core.model.control.ziegler_nichols import Gains
-from dms_core.output_file import write_csv, write_json
-from dms_core.outputs import Outputs
 from exo_env.commands.tune import draw_steps
 from exo_env.ecosystem import exoskeleton as devices
 from exo_env.ecosystem import subject as subjects

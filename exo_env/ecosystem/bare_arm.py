@@ -16,8 +16,8 @@ import numpy as np
 
 from dms_core import Trajectory
 from dms_core.errors import InputError, choices
-from dms_core.input_file import decoded, read_bytes
-from dms_core.json_text import brief
+from dms_core.files.input_file import decoded, read_bytes
+from dms_core.files.json_text import brief
 from dms_core.model import GROUND, Gravity, Input, JointAngle, JointReaction, MuscleSensor, Revolute, Steps, System
 from dms_core.model.sensors.muscle import Component
 from dms_core.model.signals import AnySignal

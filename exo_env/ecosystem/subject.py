@@ -23,11 +23,11 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, model_v
 
 from dms_core.config_files import config_file, configs
 from dms_core.errors import InputError, choices
-from dms_core.input_file import decoded, read_bytes
+from dms_core.files.input_file import decoded, read_bytes
+from dms_core.files.yaml_text import parse_yaml
 from dms_core.model import ThelenMuscle
 from dms_core.model.element import Vector
 from dms_core.validation import shown
-from dms_core.yaml_text import parse_yaml
 from exo_env.settings import Settings
 
 DEFAULT = "arm26"

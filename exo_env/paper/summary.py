@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dms_core.output_file import with_unit
+from dms_core.files.output_file import with_unit
 from exo_env.ecosystem.sensors import muscle_sensor, tension_sensor
 from exo_env.paper.scenarios import ScenarioRun
 

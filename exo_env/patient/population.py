@@ -34,8 +34,8 @@ from pydantic import Field, model_validator
 
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
+from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import shown
-from dms_core.yaml_text import read_yaml
 from exo_env.ecosystem.person import SEXES
 from exo_env.patient.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
 from exo_env.patient.patient import FIELDS, PATIENT, Patient

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from dms_core.errors import DmsError, both_ends, extra
-from dms_core.output_file import write_bytes
+from dms_core.files.output_file import write_bytes
 
 P = ParamSpec("P")
 R = TypeVar("R")

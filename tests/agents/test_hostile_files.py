@@ -21,7 +21,7 @@ from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint
 from agents.policies.safetensors import from_bytes
 from agents.training.records import read_curve, read_record
 from dms_core.errors import InputError, ModelWarning
-from dms_core.json_text import MOST_KEYS, MOST_VALUES, parse_json
+from dms_core.files.json_text import MOST_KEYS, MOST_VALUES, parse_json
 
 OLD = Path(__file__).with_name("before_the_move")
 ROOT = Path(__file__).parents[2]

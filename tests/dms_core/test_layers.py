@@ -18,6 +18,7 @@ ABOVE = {
     "model": {"linear", "assembly", "simulation"},
     "assembly": {"simulation"},
     "compiled": {"simulation", "linear"},
+    "files": {"compiled", "linear", "model", "assembly", "simulation"},
 }
 """What a folder must not import."""
 

@@ -10,6 +10,7 @@ import yaml
 import dms_core.model
 from dms_core.config_files import config_file, configs
 from dms_core.errors import DmsError, InputError, ModelError
+from dms_core.files.yaml_text import read_yaml
 from dms_core.model import (
     Constant,
     EulerNorm,
@@ -28,7 +29,6 @@ from dms_core.model import (
     ThelenMuscle,
 )
 from dms_core.model_file import BRANCHES, dump, kinds, load
-from dms_core.yaml_text import read_yaml
 from tests.example_elements import examples
 
 ROD = "bodies:\n  - {kind: rigid_body, name: rod, mass: 1.0, inertia: [0.1, 0.1, 0.1]}\n"

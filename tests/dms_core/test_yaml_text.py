@@ -10,10 +10,10 @@ import tracemalloc
 import pytest
 import yaml
 
-import dms_core.yaml_builder as builder
+import dms_core.files.yaml_builder as builder
 from dms_core.errors import InputError
-from dms_core.yaml_builder import MOST_VALUES
-from dms_core.yaml_text import MOST_PORTABLE, parse_yaml, read_value, read_yaml, yaml_of
+from dms_core.files.yaml_builder import MOST_VALUES
+from dms_core.files.yaml_text import MOST_PORTABLE, parse_yaml, read_value, read_yaml, yaml_of
 
 MOST_SECONDS, MOST_MEGABYTES = 2.0, 100
 

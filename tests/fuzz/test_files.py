@@ -19,7 +19,7 @@ from agents.evaluation.tables import short_table, whole_table
 from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint, repetitions_of
 from agents.policies.safetensors import from_bytes, to_bytes
 from agents.training.records import read_curve, read_point, read_record, read_state
-from dms_core.outputs import MANIFEST, Outputs
+from dms_core.files.outputs import MANIFEST, Outputs
 from exo_env.ecosystem.bare_arm import read_excitations
 from tests.fuzz.damage import is_read_or_refused, of_bytes, of_json
 

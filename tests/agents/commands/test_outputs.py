@@ -10,7 +10,7 @@ from agents.__main__ import main
 from agents.commands.tune_baselines import _table, _yaml
 from agents.evaluation.tables import whole_table
 from agents.evaluation.tuning import Try
-from dms_core.outputs import MANIFEST
+from dms_core.files.outputs import MANIFEST
 
 EVALUATE = ["evaluate", "--policy", "none", "--population", "stroke_mild", "--patients", "1"]
 

@@ -17,7 +17,7 @@ from agents.evaluation.report_figures import on_common_steps
 from agents.evaluation.statistics import interquartile_mean
 from agents.evaluation.time_course import time_course
 from agents.policies.baselines import policy
-from dms_core.outputs import MANIFEST
+from dms_core.files.outputs import MANIFEST
 from tests.agents.tiny import config_file
 
 PICTURES = {"learning_curves.png", "pareto.png", "patients.png", "worst_patient.png"}

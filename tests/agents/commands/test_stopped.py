@@ -15,7 +15,7 @@ import pytest
 from agents.__main__ import main
 from agents.commands.report_input import collected
 from agents.evaluation.tuning import Try, _pool
-from dms_core import output_place
+from dms_core.files import output_place
 
 ROOT = Path(__file__).resolve().parents[3]
 

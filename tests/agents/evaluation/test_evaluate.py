@@ -16,7 +16,7 @@ from agents.evaluation.tables import short_table, whole_table
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.learned import LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from dms_core.errors import InputError
-from dms_core.outputs import MANIFEST
+from dms_core.files.outputs import MANIFEST
 
 SHORT = {"episode_duration": 0.6}
 """Until the lift has begun; a whole episode tells no more and takes ten times as long."""

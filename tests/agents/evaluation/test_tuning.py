@@ -15,7 +15,7 @@ from agents.policies.lagging_pid import LaggingPid
 from agents.policies.tuned import Range, numbers
 from dms_core.config_files import configs
 from dms_core.errors import InputError
-from dms_core.yaml_text import read_yaml
+from dms_core.files.yaml_text import read_yaml
 
 SHORT = {"episode_duration": 0.6}
 

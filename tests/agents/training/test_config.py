@@ -13,7 +13,7 @@ from agents.training.config import Config
 from agents.training.rl_zoo_text import read_call, write_call
 from dms_core.config_files import configs
 from dms_core.errors import InputError
-from dms_core.yaml_text import yaml_of
+from dms_core.files.yaml_text import yaml_of
 from tests.agents.tiny import config_file, content
 
 SHIPPED = sorted((configs() / "agents").rglob("*.yml"))

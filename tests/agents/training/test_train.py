@@ -311,7 +311,7 @@ def test_train_runs_share_no_environment_seeds():
 def test_a_full_disk_is_one_sentence_wherever_it_comes(place, tmp_path, capsys, monkeypatch):
     """Each write of a training fails once, from the first on."""
     import agents.training.run
-    from dms_core import output_place
+    from dms_core.files import output_place
 
     full, known = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), output_place._replace
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import pytest
 
-from dms_core import output_place
 from dms_core.__main__ import main
+from dms_core.files import output_place
 
 
 class Outcome(NamedTuple):

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from dms_core.command_line import BAR, FAILED_RUN, USER_MISTAKE, moves
 from dms_core.config_files import config_file, configs
-from dms_core.output_file import with_unit, write_csv, write_file
+from dms_core.files.output_file import with_unit, write_csv, write_file
 from dms_core.schema import reference
 
 ROOT = configs().parent

@@ -6,9 +6,9 @@ import os
 import pytest
 
 from dms_core.errors import InputError, Stopped
-from dms_core.output_file import write_text
-from dms_core.output_place import PREFIX
-from dms_core.outputs import MANIFEST, Outputs, partial
+from dms_core.files.output_file import write_text
+from dms_core.files.output_place import PREFIX
+from dms_core.files.outputs import MANIFEST, Outputs, partial
 from tests.dms_core.cli.written import outputs, parts
 
 

@@ -9,8 +9,8 @@ import threading
 import pytest
 
 from dms_core.errors import InputError
-from dms_core.output_file import write_bytes, write_file, write_text
-from dms_core.output_place import check_folder, check_writable
+from dms_core.files.output_file import write_bytes, write_file, write_text
+from dms_core.files.output_place import check_folder, check_writable
 from tests.dms_core.cli.written import parts
 
 root_only = pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")

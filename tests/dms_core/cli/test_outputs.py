@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from dms_core.errors import DmsError, InputError, Stopped
-from dms_core.output_file import write_file, write_text
-from dms_core.output_place import PREFIX
-from dms_core.outputs import partial
+from dms_core.files.output_file import write_file, write_text
+from dms_core.files.output_place import PREFIX
+from dms_core.files.outputs import partial
 from tests.dms_core.cli.written import outputs, parts
 
 

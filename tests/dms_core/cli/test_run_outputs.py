@@ -12,9 +12,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from dms_core import Model, output_place, simulate
+from dms_core import Model, simulate
 from dms_core.__main__ import main
 from dms_core.config_files import config_file
+from dms_core.files import output_place
 from dms_core.model_file import load
 from dms_core.results import Result
 from dms_core.simulation.dynamics import Simulation

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dms_core.errors import InputError
-from dms_core.output_file import (
+from dms_core.files.output_file import (
     LARGEST_TABLE,
     check_columns,
     check_size,

@@ -1,7 +1,7 @@
 """Outputs of a command for tests, and what is left in folders."""
 
-from dms_core.output_place import PREFIX
-from dms_core.outputs import OutputFile, Outputs
+from dms_core.files.output_place import PREFIX
+from dms_core.files.outputs import OutputFile, Outputs
 
 
 def parts(folder):

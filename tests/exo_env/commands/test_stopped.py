@@ -2,7 +2,7 @@
 
 import pytest
 
-from dms_core.outputs import MANIFEST
+from dms_core.files.outputs import MANIFEST
 from exo_env.__main__ import main
 from exo_env.envs.base_env import AssistanceEnv
 

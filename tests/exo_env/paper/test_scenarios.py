@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from dms_core.outputs import MANIFEST
+from dms_core.files.outputs import MANIFEST
 from exo_env.__main__ import main
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.paper.scenarios import FILES

@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from dms_core.config_files import config_file
+from dms_core.files.outputs import MANIFEST
 from dms_core.model.control.ziegler_nichols import STEP, oscillation
-from dms_core.outputs import MANIFEST
 from exo_env.__main__ import main
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.paper.tuning import START, StepExperiment, proportional

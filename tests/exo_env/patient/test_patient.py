@@ -8,7 +8,7 @@ import pytest
 
 from dms_core.config_files import configs
 from dms_core.errors import InputError
-from dms_core.yaml_text import read_yaml
+from dms_core.files.yaml_text import read_yaml
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.person import Person
 from exo_env.patient.patient import LONGEST_DELAY, PATIENT, SHOWN, Patient

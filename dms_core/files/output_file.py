@@ -13,9 +13,9 @@ from typing import IO, Any
 import numpy as np
 
 from dms_core.errors import InputError, printable
-from dms_core.json_text import finite
-from dms_core.output_place import Content, check_kind, put
-from dms_core.outputs import active_outputs
+from dms_core.files.json_text import finite
+from dms_core.files.output_place import Content, check_kind, put
+from dms_core.files.outputs import active_outputs
 
 DIGITS = ".12g"
 """Format of numbers in tables: more digits than any tolerance in use, fewer than rounding shows."""

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from pydantic import AfterValidator
 
 from dms_core.errors import InputError, both_ends, printable
-from dms_core.input_file import decoded, read_bytes
+from dms_core.files.input_file import decoded, read_bytes
 from dms_core.validation import Checked
 
 Kind = TypeVar("Kind", bound=Checked)

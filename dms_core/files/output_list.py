@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dms_core.errors import InputError
-from dms_core.json_text import checked, read_json
-from dms_core.output_place import is_unfinished, renew
+from dms_core.files.json_text import checked, read_json
+from dms_core.files.output_place import is_unfinished, renew
 from dms_core.validation import Checked
 
 MANIFEST = ".written.json"

@@ -18,10 +18,10 @@ from typing import Any
 import yaml
 
 from dms_core.errors import InputError
-from dms_core.input_file import MOST_BYTES, decoded, read_bytes
+from dms_core.files.input_file import MOST_BYTES, decoded, read_bytes
+from dms_core.files.yaml_builder import FAST, Builder, Refused, Section, copied
+from dms_core.files.yaml_scalars import NUMBER, STANDARD, UNPRINTABLE
 from dms_core.validation import shown
-from dms_core.yaml_builder import FAST, Builder, Refused, Section, copied
-from dms_core.yaml_scalars import NUMBER, STANDARD, UNPRINTABLE
 
 MOST_PORTABLE = 100_000
 """Largest file that is read by PyYAML's own parser, as rl_zoo3 does [bytes]; it takes up to 10 s for a megabyte."""

@@ -17,9 +17,9 @@ from types import TracebackType
 from typing import IO, NamedTuple
 
 from dms_core.errors import DmsError, InputError, Stopped
-from dms_core.input_file import digest
-from dms_core.output_list import MANIFEST, is_empty, read_list, write_list
-from dms_core.output_place import (
+from dms_core.files.input_file import digest
+from dms_core.files.output_list import MANIFEST, is_empty, read_list, write_list
+from dms_core.files.output_place import (
     Content,
     PlaceError,
     cannot,

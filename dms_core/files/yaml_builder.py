@@ -11,8 +11,8 @@ from typing import Any
 
 import yaml
 
+from dms_core.files.yaml_scalars import STANDARD, TAGS, UNPRINTABLE, OlderReader, plain_scalar, tagged_scalar
 from dms_core.validation import shown
-from dms_core.yaml_scalars import STANDARD, TAGS, UNPRINTABLE, OlderReader, plain_scalar, tagged_scalar
 
 MOST_VALUES = 100_000
 """Most keys and values in a text, those that aliases stand for included."""
