@@ -80,6 +80,7 @@ def test_names_with_bars_and_breaks_leave_a_table_whole(tmp_path):
     assert {row.replace("\\|", "").count("|") for row in rows} == {3}
 
 
+@pytest.mark.slow
 def test_a_table_of_schedules_is_replaced_with_the_flag(tmp_path, capsys):
     out = tmp_path / "bound.csv"
     command = ["upper-bound", "--patients", "1", "--population", "stroke_mild", "--out", str(out)]

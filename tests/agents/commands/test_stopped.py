@@ -98,6 +98,7 @@ def test_an_evaluation_that_did_nothing_says_so(stopped_at, tmp_path, capsys):
     assert "no patient was done; nothing was written." in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_an_upper_bound_keeps_its_patients(stopped_at, tmp_path, capsys):
     stopped_at("agents.evaluation.upper_bound.tried_on", 2)
     out = tmp_path / "bound.csv"

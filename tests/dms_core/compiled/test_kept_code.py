@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -136,10 +137,10 @@ def test_code_of_one_function_is_not_taken_for_another(run):
 @pytest.mark.parametrize("run", ["NUMBA_CACHE_DIR"], indirect=True)
 def test_settings_of_numba_are_in_the_key(run):
     run()
-    for other in ({"NUMBA_OPT": "1"}, {"PYTHONOPTIMIZE": "1"}):
-        assert run(**other)["hits"] == 0
-        # Code for one setting does not take the place of that for another.
-        assert run(**other)["hits"] == 1 and run()["hits"] == 1
+    other = {"NUMBA_OPT": "1", "PYTHONOPTIMIZE": "1"}
+    assert run(**other)["hits"] == 0
+    # Code for one setting does not take the place of that for another.
+    assert run(**other)["hits"] == 1 and run()["hits"] == 1
 
 
 @pytest.mark.parametrize("run", ["beside the files"], indirect=True)
@@ -188,32 +189,41 @@ OTHER_WAYS = {
 """How a function may come to what it does: the inner file, more of the outer one, and what that returns."""
 
 
-@pytest.mark.parametrize("way", OTHER_WAYS)
-def test_whatever_a_function_is_made_of_is_in_its_key(tmp_path, way):
-    inner, more, value = OTHER_WAYS[way]
-    own = tmp_path / "own"
-    own.mkdir()
-    (own / "__init__.py").touch()
-    (own / "profile.py").write_text("GAIN = 2.0\n")
-    (own / "inner.py").write_text(inner)
-    imported = "from own.inner import f\n" if "f(" in value and not more else ""
-    (own / "outer.py").write_text(
-        f"from dms_core.compiled.jit import compiled\n{more}{imported}\n@compiled\ndef outer(x):\n    return {value}\n"
-    )
+def test_whatever_a_function_is_made_of_is_in_its_key(tmp_path):
+    names = {way: f"way{k}" for k, way in enumerate(OTHER_WAYS)}
+    for way, (inner, more, value) in OTHER_WAYS.items():
+        own = tmp_path / names[way]
+        own.mkdir()
+        (own / "__init__.py").touch()
+        (own / "profile.py").write_text("GAIN = 2.0\n")
+        imported = "from own.inner import f\n" if "f(" in value and not more else ""
+        head = f"from dms_core.compiled.jit import compiled\n{more}{imported}\n"
+        outer = f"{head}@compiled\ndef outer(x):\n    return {value}\n"
+        for file, text in (("inner.py", inner), ("outer.py", outer)):
+            (own / file).write_text(re.sub(r"\bown\b", names[way], text))
     env = os.environ | {"PYTHONPATH": os.pathsep.join([str(configs().parent), str(tmp_path)])}
-    call = "from own.outer import outer; print(outer(3.0), sum(outer.stats.cache_hits.values()))"
+    call = (
+        "import importlib, json, sys\nfound = {}\nfor name in sys.argv[1:]:\n"
+        "    outer = importlib.import_module(f'{name}.outer').outer\n"
+        "    found[name] = outer(3.0), sum(outer.stats.cache_hits.values())\nprint(json.dumps(found))\n"
+    )
 
-    def run() -> list[str]:
+    def run() -> dict[str, list[float]]:
         done = subprocess.run(
-            [sys.executable, "-c", call], env=env, capture_output=True, text=True, check=False, timeout=120
-        )
+            [sys.executable, "-c", call, *names.values()],
+            env=env, capture_output=True, text=True, check=False, timeout=240,
+        )  # fmt: skip
         assert done.returncode == 0, done.stderr
-        return done.stdout.split()
+        found = json.loads(done.stdout)
+        return {way: found[name] for way, name in names.items()}
 
-    assert run() == ["6.0", "0"] and run() == ["6.0", "1"]
-    for name in ("inner.py", "profile.py"):
-        (own / name).write_text((own / name).read_text().replace("2.0", "5.0"))
-    assert run() == ["15.0", "0"]
+    assert run() == dict.fromkeys(OTHER_WAYS, [6.0, 0])
+    assert run() == dict.fromkeys(OTHER_WAYS, [6.0, 1])
+    for name in names.values():
+        for file in ("inner.py", "profile.py"):
+            path = tmp_path / name / file
+            path.write_text(path.read_text().replace("2.0", "5.0"))
+    assert run() == dict.fromkeys(OTHER_WAYS, [15.0, 0])
 
 
 def test_what_no_key_can_hold_is_not_kept():

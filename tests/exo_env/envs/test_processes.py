@@ -12,7 +12,10 @@ from gymnasium.vector import AsyncVectorEnv
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 
 ACTIONS = np.random.default_rng(0).uniform(-1.0, 1.0, (8, 4, 2))
-START_METHODS = [name for name in ("fork", "forkserver", "spawn") if name in multiprocessing.get_all_start_methods()]
+START_METHODS = [
+    pytest.param(name, marks=pytest.mark.slow if name == "spawn" else ())
+    for name in ("fork", "forkserver", "spawn") if name in multiprocessing.get_all_start_methods()
+]  # fmt: skip
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
 
 
