@@ -190,14 +190,17 @@ def fibre_at_rest(par, length, a):
     low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[MUSCLE.L0]) * (1.0 + 1e-12)
     # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
     high = math.hypot(max(room, 0.0), height)
-    if high <= top or surplus(par, length, top, a) >= 0.0:
+    if high <= top:
         return _rest_on_stop(par, length, a)
     f_low, f_high, moved = surplus(par, length, low, a), surplus(par, length, high, a), 0.0
     if f_low >= 0.0:
         low, f_low = top, surplus(par, length, top, a)
+    if f_low >= 0.0:
+        return _rest_on_stop(par, length, a)
     for _ in range(MOST_TRIALS):
         x = trial(low, f_low, high, f_high)
         if not low < x < high:
             break
         low, f_low, high, f_high, moved = narrowed(low, f_low, high, f_high, moved, x, surplus(par, length, x, a))
-    return low if -f_low < f_high else high
+    found = low if -f_low < f_high else high
+    return found if found > top else _rest_on_stop(par, length, a)

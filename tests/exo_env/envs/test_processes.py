@@ -177,7 +177,7 @@ def test_a_pool_of_processes_takes_environments():
     """Each task pickles the environment, generator included."""
     env = ElbowLiftEnv()
     env.reset(seed=5)
-    with multiprocessing.get_context(START_METHODS[0]).Pool(1) as pool:
+    with multiprocessing.get_context(multiprocessing.get_all_start_methods()[0]).Pool(1) as pool:
         one, other = pool.map(_worker, [env, env])
     np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(one, env.reset()[0])
