@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from dms_core.errors import InputError, choices
-from dms_core.validation import shown
+from dms_core.validation import cut, shown
 
 from .config import OURS, Config
 from .critic import TwoViewPolicy, seen_places
@@ -174,7 +174,7 @@ def _check(who: str, given: Any, known: Mapping[str, Any], others: Sequence[str]
         raise InputError(f"{who} = {shown(given)}: expected a mapping.")
     for key, value in given.items():
         if key not in known:
-            raise InputError(f"{who}: unknown key '{key}'. Allowed: {choices([*known, *others])}.")
+            raise InputError(f"{who}: unknown key '{cut(key)}'. Allowed: {choices([*known, *others])}.")
         if key != "activation_fn" and not fits(value, known[key]):
             raise InputError(f"{who}: {key} = {shown(value)}: expected {_in_words(known[key])}.")
 

@@ -23,7 +23,7 @@ from pydantic import Field
 
 from dms_core.errors import InputError, choices
 from dms_core.files.yaml_text import read_yaml
-from dms_core.validation import shown
+from dms_core.validation import cut, shown
 from exo_env.settings import Settings
 
 from .config_file import SAME_SETTINGS, TRAINING, check_wrapper, chosen, override_values, sections
@@ -184,7 +184,7 @@ def _normalisation(value: Any, section: Mapping[str, Any]) -> dict[str, Any] | N
         given = _mapping("normalize", value)
     for key, one in given.items():
         if key not in NORMALISATION:
-            raise InputError(f"normalize: unknown key '{key}'. Allowed: {choices(NORMALISATION)}.")
+            raise InputError(f"normalize: unknown key '{cut(key)}'. Allowed: {choices(NORMALISATION)}.")
         kinds = (bool,) if NORMALISATION[key] is bool else (int, float)
         if not isinstance(one, kinds) or (bool not in kinds and (isinstance(one, bool) or not 0 < one < math.inf)):
             right = "true or false" if bool in kinds else "a positive number"

@@ -35,7 +35,7 @@ from pydantic import Field, model_validator
 from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
 from dms_core.files.yaml_text import read_yaml
-from dms_core.validation import shown
+from dms_core.validation import cut, shown
 from exo_env.ecosystem.person import SEXES
 from exo_env.patient.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
 from exo_env.patient.patient import FIELDS, PATIENT, Patient
@@ -174,7 +174,7 @@ class Population(Settings):
         known = [*Patient.model_fields, BODY_MASS_INDEX]
         for name in self.fields:
             if name not in known:
-                raise InputError(f"fields: unknown key '{name}'. Allowed: {choices(known)}.")
+                raise InputError(f"fields: unknown key '{cut(name)}'. Allowed: {choices(known)}.")
         if {BODY_MASS_INDEX, "body_mass"} <= self.fields.keys():
             raise InputError(f"fields: body_mass and {BODY_MASS_INDEX} are both given; expected one of them.")
         found = self.distributions
