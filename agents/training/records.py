@@ -115,9 +115,7 @@ def read_state(checkpoint: Path) -> dict[str, Any]:
     Raises:
         InputError: it is missing or not whole.
     """
-    content = read_json(checkpoint / STATE)
-    checked(State, content, f"file '{checkpoint / STATE}'")
-    return content
+    return _read_state(checkpoint, State)
 
 
 def read_point(checkpoint: Path) -> dict[str, Any]:
@@ -126,6 +124,10 @@ def read_point(checkpoint: Path) -> dict[str, Any]:
     Raises:
         InputError: it is missing or not whole.
     """
+    return _read_state(checkpoint, CurvePoint)
+
+
+def _read_state(checkpoint: Path, kind: type[Checked]) -> dict[str, Any]:
     content = read_json(checkpoint / STATE)
-    checked(CurvePoint, content, f"file '{checkpoint / STATE}'")
+    checked(kind, content, f"file '{checkpoint / STATE}'")
     return content

@@ -73,29 +73,40 @@ def open_call(layout: Layout, dynamics: np.ndarray, constraints: np.ndarray, w: 
     return layout.dynamics[e] if e >= 0 else None
 
 
-def sentence(layout: Layout, call: Call) -> str:
-    """Whose equations are not finite, with the most extreme numbers of that element and of the bodies it acts on."""
+def sentence(layout: Layout, call: Call, when: str = "") -> str:
+    """Whose equations are not finite, with the most extreme numbers of that element and of the bodies it acts on.
+
+    Args:
+        layout: of the model.
+        call: of the element.
+        when: words behind "not finite", with a space before them.
+    """
     element = call.element
     found = []
     for one in (element, *(layout.system.body(b) for b in call.placement.bodies if b != GROUND)):
         whose = "" if one is element else f" of {one.kind} '{one.name}'"  # type: ignore[union-attr]
-        found += [(abs(math.log10(abs(x))), f"{key} = {x}{whose}") for key, x in numbers_in(one) if x != 0.0]
-    most = [said for _, said in sorted(dict.fromkeys(found), reverse=True)[:NAMED]]
-    hint = (
-        f" Its numbers farthest from 1: {', '.join(most)}; expected ones with which they stay finite." if most else ""
-    )
-    return f"{element.kind} '{element.name}': its equations are not finite.{hint}"
+        found += [(x, f"{key} = {x}{whose}") for key, x in numbers_in(one) if x != 0.0]
+    most = _farthest_from_1(found)
+    hint = f" Its numbers farthest from 1: {most}; expected ones with which they stay finite." if most else ""
+    return f"{element.kind} '{element.name}': its equations are not finite{when}.{hint}"
 
 
 def far_numbers(system: System) -> str:
     """The declared numbers that are so far from 1 that they may be why, as a sentence with a space before it."""
-    found = []
-    for element in system.everything():
-        for key, x in numbers_in(element):
-            if x != 0.0 and not 10.0**-FAR < abs(x) < 10.0**FAR:
-                found.append((abs(math.log10(abs(x))), f"{key} = {x} of {element.kind} '{element.name}'"))
-    most = [said for _, said in sorted(found, reverse=True)[:NAMED]]
-    return f" Look at numbers far from 1 in SI units: {', '.join(most)}." if most else ""
+    found = [
+        (x, f"{key} = {x} of {element.kind} '{element.name}'")
+        for element in system.everything()
+        for key, x in numbers_in(element)
+        if x != 0.0 and not 10.0**-FAR < abs(x) < 10.0**FAR
+    ]
+    most = _farthest_from_1(found)
+    return f" Look at numbers far from 1 in SI units: {most}." if most else ""
+
+
+def _farthest_from_1(found: list[tuple[float, str]]) -> str:
+    """What is said of the numbers whose sizes are farthest from 1."""
+    ranked = sorted({(abs(math.log10(abs(x))), said) for x, said in found}, reverse=True)
+    return ", ".join(said for _, said in ranked[:NAMED])
 
 
 @contextlib.contextmanager
@@ -117,6 +128,4 @@ def check_finite(layout: Layout, call: Call | None) -> None:
         ModelError: names the element and its numbers.
     """
     if call is not None:
-        raise ModelError(
-            sentence(layout, call).replace("not finite.", "not finite at the start.", 1), call.element.name
-        )
+        raise ModelError(sentence(layout, call, " at the start"), call.element.name)

@@ -56,9 +56,10 @@ READERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
 }
 
 
-def grown(reader: str) -> Any:
-    """Arguments of a test: files that grew from the shipped ones of a reader."""
-    return given(content=mutated([path.read_text("utf-8") for path in sorted(configs().glob(READERS[reader][0]))]))
+@cache
+def grown(reader: str) -> st.SearchStrategy[bytes]:
+    """Files that grew from the shipped ones of a reader."""
+    return mutated([path.read_text("utf-8") for path in sorted(configs().glob(READERS[reader][0]))])
 
 
 def tried(read: Callable[[], Any]) -> None:
@@ -94,44 +95,10 @@ def refused_or_read(tmp_path):
     return check
 
 
-@grown("model")
-def test_a_model_is_read_or_refused(refused_or_read, content):
-    refused_or_read("model", content)
-
-
-@grown("population")
-def test_a_population_is_read_or_refused(refused_or_read, content):
-    refused_or_read("population", content)
-
-
-@grown("device")
-def test_a_device_is_read_or_refused(refused_or_read, content):
-    refused_or_read("device", content)
-
-
-@grown("machine")
-def test_a_machine_is_read_or_refused(refused_or_read, content):
-    refused_or_read("machine", content)
-
-
-@grown("subject")
-def test_a_subject_is_read_or_refused(refused_or_read, content):
-    refused_or_read("subject", content)
-
-
-@grown("exercise")
-def test_a_exercise_is_read_or_refused(refused_or_read, content):
-    refused_or_read("exercise", content)
-
-
-@grown("scenario")
-def test_a_scenario_is_read_or_refused(refused_or_read, content):
-    refused_or_read("scenario", content)
-
-
-@grown("config")
-def test_a_config_is_read_or_refused(refused_or_read, content):
-    refused_or_read("config", content)
+@pytest.mark.parametrize("reader", READERS)
+@given(data=st.data())
+def test_a_file_is_read_or_refused(refused_or_read, reader, data):
+    refused_or_read(reader, data.draw(grown(reader)))
 
 
 KEYS = [

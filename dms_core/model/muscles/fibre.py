@@ -75,10 +75,16 @@ MUSCLE = MuscleNumbers()
 
 
 @compiled
+def steepest_fibre(par):
+    """Length at which a fibre's pennation is the largest [m]; 0 without pennation."""
+    return par[MUSCLE.height] / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE)
+
+
+@compiled
 def pennation_cosine(par, length):
     """(cos(alpha), its slope by the fibre length [1/m])."""
     height = par[MUSCLE.height]
-    if length <= height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE):
+    if length <= steepest_fibre(par):
         # A fibre without height is parallel to the tendon at every length, even where Newton's method tries l <= 0.
         return (LEAST_COSINE, 0.0) if height > 0.0 else (1.0, 0.0)
     s = height / length
@@ -89,8 +95,7 @@ def pennation_cosine(par, length):
 @compiled
 def smallest_fibre(par):
     """Length below which no fibre shortens [m]."""
-    steepest = par[MUSCLE.height] / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE)
-    return max(steepest, SHORTEST * par[MUSCLE.L0])
+    return max(steepest_fibre(par), SHORTEST * par[MUSCLE.L0])
 
 
 @compiled
@@ -187,7 +192,7 @@ def fibre_at_rest(par, length, a):
     """Fibre length [m] at which the fibre row is 0 at rate 0, to rounding; on the stop where there is no more room."""
     height, room = par[MUSCLE.height], length - par[MUSCLE.Ls]
     top = stop_begins(par)
-    low = max(height / math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE), 1e-3 * par[MUSCLE.L0]) * (1.0 + 1e-12)
+    low = max(steepest_fibre(par), 1e-3 * par[MUSCLE.L0]) * (1.0 + 1e-12)
     # The tendon is slack at the upper end, where the fibre pulls; it is strained most at the lower end.
     high = math.hypot(max(room, 0.0), height)
     if high <= top:
