@@ -106,6 +106,10 @@ class PlanTables(NamedTuple):
     """How far ahead the reference is shown [s]."""
     preview: Cleared
     """psi that far ahead at each control time, shape (k, n)."""
+    loads: Filled
+    """Weight on the machine at each control time [kg], shape (k,)."""
+    needed: Filled
+    """Moment that arm and load need along psi at each control time [Nm], shape (k,)."""
     lacking: Cleared
     """What the patient cannot give of the needed moment at each control time [Nm], shape (k,)."""
     scale: Cleared
@@ -167,6 +171,8 @@ class DrawTables(NamedTuple):
     """Row of the patient."""
     movement: Filled
     """Numbers of the movement."""
+    task: Filled
+    """Numbers that the task draws, in the order of `Task.draws`."""
     given: Filled
     """Load, angle and phase of the start, at the places of GIVEN."""
 
