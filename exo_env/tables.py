@@ -58,6 +58,8 @@ class DriveTables(NamedTuple):
     """Coordinate of each motor or filter that follows a command, and the command's number, shape (k, 2)."""
     rows: Kept
     """Row of each command in the signals of the world, shape (n_c,)."""
+    hinge: Kept
+    """Place in y of the angle that the device measures at its hinge, shape (1,)."""
     axes: Kept
     """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
     action: Cleared

@@ -155,6 +155,7 @@ class PatientWorld:
             steps=np.array([c.rate for c in commands]) * self.period, start=self.drive.start_table(device),
             motors=np.array(motors, np.int64).reshape(-1, 2),
             rows=np.array([self._row(c.name) for c in commands], np.int64),
+            hinge=np.array([self.names["exo_angle.angle"]], np.int64),
             axes=np.ascontiguousarray(self._worn.frame), action=np.zeros(len(actions)), before=np.zeros(len(actions)),
             wanted=np.zeros(n), commands=np.zeros(n),
         )  # fmt: skip
