@@ -13,7 +13,7 @@ from exo_env.tasks.submovements import UNIT
 EARLIEST, LATEST = 0.3, 0.7
 """Parts of a move after which the patient may change mind [-]; assumed."""
 BROKEN_OFF = 0.5
-"""Share of these changes in which the hand goes back to where it came from; in the others it goes elsewhere; assumed."""
+"""Share of these changes in which the hand goes back to where it came from, not elsewhere; assumed."""
 
 
 class Move(NamedTuple):

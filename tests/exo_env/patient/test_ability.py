@@ -28,7 +28,9 @@ def need(patient, model, course):
     """Need of a movement."""
     lacking, weights = np.zeros(len(course)), np.full(len(course), model.load.weight)
     link = DEVICE.lower_link.numbers()
-    found, scale = put_lacking(patient.row(), model.arm, model.load, weights, link, course, np.zeros(len(course)), lacking)
+    found, scale = put_lacking(
+        patient.row(), model.arm, model.load, weights, link, course, np.zeros(len(course)), lacking
+    )
     return Need(found, lacking, scale)
 
 
