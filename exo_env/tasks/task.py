@@ -119,8 +119,8 @@ class Task(ABC):
         """
 
     def start_range(self) -> tuple[float, float]:
-        """Elbow angles at which an episode may begin [deg]."""
-        return 0.0, 142.0
+        """Elbow angles at which an episode may begin [deg], as far as the stops of the arm let it."""
+        return -180.0, 180.0
 
     def numbers(self) -> np.ndarray:
         """Numbers that the kernels read beside the readings: here those of the limits, shape (n,)."""
