@@ -31,7 +31,7 @@ class Limits(Settings):
         default=147.0,
         ge=10.0,
         le=160.0,
-        description="elbow angle [deg]; assumed: 5 deg beyond the mean active flexion of men",
+        description="elbow angle [deg]; assumed: 5 deg beyond men's mean active flexion",
     )
     tension: float = Field(default=1000.0, gt=0.0, description="of a rope [N]; assumed: two thirds of the motor's most")
     reaction: float = Field(
