@@ -21,7 +21,15 @@ from dms_core.model.constraints import (
 )
 from dms_core.model.control import DelayedError, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
-from dms_core.model.forces import FirstOrder, Gravity, JointSpringDamper, LumpedLoad, SecondOrder, SpringDamper
+from dms_core.model.forces import (
+    FirstOrder,
+    Gravity,
+    JointSpringDamper,
+    JointStop,
+    LumpedLoad,
+    SecondOrder,
+    SpringDamper,
+)
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
 from dms_core.model.ropes import PathPoint, RopeForce
 from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSensor, Point, RopeSensor, Tracking
@@ -49,6 +57,7 @@ __all__ = [
     "JointMoment",
     "JointReaction",
     "JointSpringDamper",
+    "JointStop",
     "LineGuide",
     "Lines",
     "LumpedLoad",

@@ -112,14 +112,9 @@ class AssistanceEnv(Copied, gymnasium.Env):
         self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
         self._weights = self.task.weights.model_dump()
         self._draws = EpisodeDraws(
-            self.population,
-            self.load,
-            self.movement,
-            self.made_movement,
-            self.duration,
-            self.task.start_range(),
-            self.task.draws(),
-        )
+            self.population, self.load, self.movement, self.made_movement, self.duration,
+            self.ecosystem.arm().within_stops(*self.task.start_range()), self.task.draws(),
+        )  # fmt: skip
         self._sources = self._draws.sources
         self._keys = Keys(s.cycle)
         self._readout: Readout | None = None

@@ -97,11 +97,12 @@ class ElbowLiftEnv(AssistanceEnv):
     `ability`, the share of arm and load that the patient can hold (`exo_env/patient/ability.py`).
 
     ## Episode End
-    Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
+    Terminated, with a sentence in `info["event"]`, when the elbow leaves -5 to 147 deg, a rope exceeds 1000 N, the
     elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
-    `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), or as long for each of
-    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`, and the spec of
-    an environment says its own.
+    `info["solver_failed"]` is true). The elbow has stops at 0 and 142 deg, which yield by less than 3 deg where an arm
+    falls straight; at rest against a stop is no event, far beyond one is. Truncated after `episode_duration` (6 s), or
+    as long for each of several repetitions, at whatever control rate; so the registration has no `max_episode_steps`,
+    and the spec of an environment says its own.
 
     ## Arguments
     All by keyword, all JSON.
