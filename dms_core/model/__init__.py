@@ -19,7 +19,7 @@ from dms_core.model.constraints import (
     Slider,
     Spherical,
 )
-from dms_core.model.control import DelayedError, Pid, ReferenceFilter, RopeActuator
+from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
 from dms_core.model.forces import (
     FirstOrder,
@@ -51,6 +51,7 @@ __all__ = [
     "Function",
     "Gravity",
     "Harmonic",
+    "ImpedanceController",
     "Imu",
     "Input",
     "JointAngle",

@@ -35,6 +35,7 @@ from dms_core.validation import plain
 from exo_env.drives.assist_moment import AssistMoment
 from exo_env.drives.checked import check_drive
 from exo_env.drives.drive import Drive, checked_action
+from exo_env.drives.impedance import Impedance
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.ecosystem.ecosystem import Ecosystem
@@ -79,6 +80,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
     task_type: ClassVar[type[Task]]
     drives: ClassVar[Mapping[str, type[Drive]]] = {
         "rope_tension": RopeTension, "pid_setpoint": PidSetpoint, "assist_moment": AssistMoment,
+        "impedance": Impedance,
     }  # fmt: skip
     settings_type: ClassVar[type[EnvSettings]] = EnvSettings
     ecosystem_type: ClassVar[type[Ecosystem]] = Ecosystem
