@@ -55,7 +55,7 @@ class Impedance(RopeMotors):
     max_stiffness: float = Field(
         default=30.0, gt=0.0, le=1000.0,
         description="largest K [Nm/rad]; assumed: 0.5 rad away it asks for all that the ropes can give, and times the "
-        "motors' lag it is below the friction of the default hinge, 1 N m s/rad, so that no damping of its own is needed",
+        "motors' lag it is below the friction of the default hinge, 1 N m s/rad, so that it needs no damping of its own",
     )  # fmt: skip
     max_damping: float = Field(
         default=3.0, gt=0.0, le=100.0, description="largest D [N m s/rad]; assumed: three times the hinge's friction"

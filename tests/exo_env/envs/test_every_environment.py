@@ -68,7 +68,7 @@ def test_every_action_mode_goes_on_from_a_copy(name, mode):
 def test_the_page_says_what_the_environment_has(name):
     env = made(name)
     page = inspect.getdoc(type(env))
-    table = re.findall(r"^\| +\d+ +\| +(.+?) +\| +(\S+) +\| +(\S+) +\| +(\S+) +\| +(\S+) +\|$", page, re.MULTILINE)
+    table = re.findall(r"^\| +\d+ +\| +([^|]+?) +\| +(\S+) +\| +(\S+) +\| +(\S+) +\| +(\S+) +\|$", page, re.MULTILINE)
     parts = [(s, label) for s in env.observation_structure for label in s.labels]
     assert len(table) == len(parts)
     for (channel, low, high, unit, scale), (part, label), least, most in zip(
