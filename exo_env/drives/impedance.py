@@ -21,14 +21,15 @@ period is the reset to the letter without its jumps, and T_0 of an hour a spring
 M_g is the moment that holds the arm of an average person (the default `Person`) and the lower link of the device, since
 the device does not know the patient. A share above 1 carries load too.
 
-At the start the spring is slack, and the share is what lets the agonist hold what the muscles do not, as far as
-`max_gravity_share` goes. Of several ropes that pull the same way the first one is used, the others are slack; without
-a rope that lowers the law only flexes.
+At the start stiffness and damping are none, and the share is what lets the agonist hold what the muscles do not, as
+far as `max_gravity_share` goes. Of several ropes that pull the same way the first one is used, the others are slack;
+without a rope that lowers the law only flexes.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -55,7 +56,7 @@ class Impedance(RopeMotors):
     max_stiffness: float = Field(
         default=30.0, gt=0.0, le=1000.0,
         description="largest K [Nm/rad]; assumed: 0.5 rad away it asks for all that the ropes can give, and times the "
-        "motors' lag it is below the friction of the default hinge, 1 N m s/rad, so that it needs no damping of its own",
+        "motors' lag it is below the friction of the default hinge, 1 N m s/rad, so that it needs no damping beside",
     )  # fmt: skip
     max_damping: float = Field(
         default=3.0, gt=0.0, le=100.0, description="largest D [N m s/rad]; assumed: three times the hinge's friction"
@@ -75,10 +76,11 @@ class Impedance(RopeMotors):
         return "stiffness", "damping", "gravity share"
 
     def commands(self, device: Exoskeleton) -> tuple[Command, ...]:
-        """Stiffness, damping and share; the first two begin with a half, as for zeros, and the share holds the arm."""
+        """Stiffness, damping and share; the first two begin with none, and the share holds the arm."""
+        # With all at 0 in the template model too, no order of elimination relies on numbers that an action may take.
         return (
-            Command(STIFFNESS, self.change_rate * self.max_stiffness, start=0.5 * self.max_stiffness),
-            Command(DAMPING, self.change_rate * self.max_damping, start=0.5 * self.max_damping),
+            Command(STIFFNESS, self.change_rate * self.max_stiffness),
+            Command(DAMPING, self.change_rate * self.max_damping),
             Command(
                 SHARE, self.change_rate * self.max_gravity_share, holds=self.max_gravity_share,
                 carries=carried(device), motor=motor_name(device.lifting_rope),
@@ -110,13 +112,18 @@ class Impedance(RopeMotors):
         """A motor that follows the law."""
         return RopeActuator(
             name=motor_name(rope), rate_of=f"{LAW}.{rope}_impulse", time_constant=self.time_constant,
-            max_tension=self.largest(device)[rope],
+            max_tension=self.largest(device)[rope], start_tension=0.0,
         )  # fmt: skip
 
 
 def carried(device: Exoskeleton) -> tuple[float, float]:
     """m_c and m_s [Nm] of M_g = m_c cos(theta) + m_s sin(theta), of an average person's arm and the device's link."""
+    by_cos, by_sin, g = _average_arm()
+    return by_cos + device.own_moment(0.0, g), by_sin + device.own_moment(0.5 * math.pi, g)
+
+
+@cache
+def _average_arm() -> tuple[float, float, float]:
+    """m_c and m_s of an average person's arm [Nm], and gravity [m/s^2]."""
     arm = Arm()
-    g = float(np.linalg.norm(arm.gravity))
-    by_cos, by_sin = (device.own_moment(x, g) - arm.gravity_moment(x) for x in (0.0, 0.5 * math.pi))
-    return by_cos, by_sin
+    return -arm.gravity_moment(0.0), -arm.gravity_moment(0.5 * math.pi), float(np.linalg.norm(arm.gravity))

@@ -90,7 +90,7 @@ def test_reset_options_that_stay():
 
 
 def test_a_reference_that_the_episode_cuts_off_is_told():
-    with pytest.warns(UserWarning, match="may take 8.9 s, and an episode ends after 6 s"):
+    with pytest.warns(UserWarning, match="may take 9.3 s, and an episode ends after 6 s"):
         ElbowLiftEnv(reference={"duration": 4.0, "pause": 0.5})
 
 

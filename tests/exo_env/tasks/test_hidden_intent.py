@@ -102,7 +102,7 @@ def test_channels_are_composed_by_name():
     [
         ({"observation": ["device.reference"]}, "group 'device' has no channel 'reference'"),
         ({"observation": ["plan"]}, "group 'plan' is unknown"),
-        ({"action_mode": "pid_setpoint"}, "the patient's plan is hidden: expected one of assist_moment"),
+        ({"action_mode": "pid_setpoint"}, "the patient's plan is hidden: expected one of rope_tension"),
         ({"action_mode": "muscles"}, "expected one of"),
         ({"repetitions": 0}, "repetitions = 0"),
     ],
