@@ -133,8 +133,8 @@ class ElbowLiftEnv(AssistanceEnv):
     of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
 
     ## Version History
-    * v2: the rest before a lift is drawn, so that the time does not tell when it begins; elbows have stops, and a straight
-      arm rests; the patient acts at a rate of its own and predicts through its delays; other action modes
+    * v2: the rest before a lift is drawn, so that the time does not tell when it begins; elbows have stops, and a
+      straight arm rests; the patient acts at a rate of its own and predicts through its delays; further action modes
     * v1: every number of an episode has a random stream of its own, so that other patients are drawn; physics, rewards
       and observations are those of v0
     * v0: first version
