@@ -53,6 +53,9 @@ class Impedance(RopeMotors):
 
     kernel: ClassVar[Any] = affine
     rtol: ClassVar[float] = 0.01
+    """Over an episode of rough actions the elbow of 40 patients stayed within 0.3e-3 rad of the run at 1e-6 in half of
+    them, within 1.0e-3 in nine of ten; 0.02 gives 0.4e-3 and 1.0e-3, 0.7e-3 and 1.5e-3 on another population, and is
+    only a fifteenth faster."""
     max_stiffness: float = Field(
         default=30.0, gt=0.0, le=1000.0,
         description="largest K [Nm/rad]; assumed: 0.5 rad away it asks for all that the ropes can give, and times the "
@@ -62,7 +65,7 @@ class Impedance(RopeMotors):
         default=3.0, gt=0.0, le=100.0, description="largest D [N m s/rad]; assumed: three times the hinge's friction"
     )
     max_gravity_share: float = Field(
-        default=3.5, gt=0.0, le=100.0, description="largest s [-]; assumed: it holds 2 kg in a limp arm"
+        default=4.0, gt=0.0, le=100.0, description="largest s [-]; assumed: 3.7 hold 2 kg in a limp arm"
     )
     relaxation_time: float = Field(
         default=0.1, ge=0.001, le=1e4, description="T_0 with which the spring's zero follows the angle [s]; assumed"
