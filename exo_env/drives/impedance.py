@@ -10,13 +10,13 @@ law acts at all times within a control period; an action only changes its three 
 with a largest rate, so that nothing jumps.
 
 The spring has no angle to hold, for the device knows no reference. If its zero were set to the measured angle at each
-control time, as "reset about the measured angle" says to the letter, it would never be more than 0.02 s behind the
-arm: such a spring is a damper of 0.01 s times K whose moment jumps 50 times a second. Here the zero follows the
-angle with the time constant T_0 (`relaxation_time`), as in a spring and a damper in series (Maxwell). What is quicker
-than T_0 meets the spring: tremor of 4 Hz and more, a push, a load that drops. What is slower meets a damper of K T_0,
-and the patient moves where he likes. The default of 0.1 s, a corner at 1.6 Hz, lies between tremor and voluntary
-movement: 60 deg in 1.5 s meet 2 Nm at their quickest where K is half of the default's largest. T_0 of half a control
-period is the reset to the letter without its jumps, and T_0 of an hour a spring about the angle of the start.
+control time, every 0.02 s, it would hardly ever be apart from the arm: such a spring is a damper of 0.01 s times K
+whose moment jumps 50 times a second. Here the zero follows the angle with the time constant T_0 (`relaxation_time`), as
+in a spring and a damper in series (Maxwell). What is quicker than T_0 meets the spring: tremor of 4 Hz and more, a
+push, a load that drops. What is slower meets a damper of K T_0, and patients move where they like. The default of 0.1
+s, a corner at 1.6 Hz, lies between tremor and voluntary movement: 60 deg in 1.5 s meet 2 Nm at their quickest where K
+is half of the default's largest. T_0 of half a control period is that reset without its jumps, and T_0 of an hour a
+spring about the angle of the start.
 
 M_g is the moment that holds the arm of an average person (the default `Person`) and the lower link of the device, since
 the device does not know the patient. A share above 1 carries load too.
@@ -75,7 +75,12 @@ class Impedance(RopeMotors):
     )
 
     def actions(self, device: Exoskeleton) -> tuple[str, ...]:
-        """Stiffness, damping and gravity share."""
+        """Stiffness, damping and gravity share.
+
+        Raises:
+            InputError: there are not as many largest tensions as the device has ropes.
+        """
+        self.largest(device)
         return "stiffness", "damping", "gravity share"
 
     def commands(self, device: Exoskeleton) -> tuple[Command, ...]:

@@ -162,7 +162,7 @@ def test_the_law_lies_within_the_period_and_not_at_its_ends():
 )
 def test_wrong_settings(settings, complaint):
     with pytest.raises(InputError, match=complaint):
-        made(drive_settings=settings)
+        ElbowLiftEnv(action_mode="impedance", drive_settings=settings)
 
 
 @pytest.mark.parametrize("action", [np.zeros(2), np.full(3, np.nan), [0.0, 0.0, math.inf]])
