@@ -8,7 +8,7 @@ import numpy as np
 
 from exo_env.ecosystem.arm import Arm
 from exo_env.patient.effort import PRESENT, EffortState, new_effort, reset_effort, start_excitation, step_effort
-from exo_env.patient.patient import PATIENT, Patient
+from exo_env.patient.patient import MIDDLE, PATIENT, Patient
 
 MUSCLES, SIGN = Arm().muscles, Arm().signs
 
@@ -28,10 +28,15 @@ class AtWork:
         reset_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), phase)
         return np.array([start_excitation(self.state, k) for k in range(len(SIGN))])
 
-    def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0) -> np.ndarray:
+    def step(
+        self, wanted: np.ndarray, *, error: float = 0.0, error_rate: float = 0.0, angle: float = MIDDLE,
+        rate: float = 0.0,
+    ) -> np.ndarray:  # fmt: skip
         """Excitations at the end of the coming period."""
         out, noise = np.empty(len(SIGN)), self.generator.standard_normal()
-        step_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), error, rate, noise, out)
+        step_effort(
+            self.numbers, self.state, self.period, np.asarray(wanted, float), error, error_rate, angle, rate, noise, out
+        )
         return out
 
     @property

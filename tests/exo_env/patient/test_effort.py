@@ -320,14 +320,16 @@ def test_states_of_a_batch_are_the_single_patients():
     generators = [np.random.default_rng(9) for _ in patients]
     singles = [AtWork(p, PERIOD, np.random.default_rng(9)) for p in patients]
     for k, patient in enumerate(patients):
-        for array in states[k][1:]:
-            array[:] = np.nan
+        # What the patient knows of the limb is put in place by another function.
+        for name in set(states[k]._fields) - {"sign", "limb", "levers"}:
+            getattr(states[k], name)[:] = np.nan
         reset_effort(patient.row(), states[k], PERIOD, RAMP[0], generators[k].uniform(0.0, 2.0 * np.pi))
         singles[k].reset(RAMP[0])
     for row in RAMP:
         for k, patient in enumerate(patients):
-            step_effort(patient.row(), states[k], PERIOD, row, 0.1, 0.7, generators[k].standard_normal(), out[k])
-            np.testing.assert_array_equal(out[k], singles[k].step(row, error=0.1, rate=0.7))
+            noise = generators[k].standard_normal()
+            step_effort(patient.row(), states[k], PERIOD, row, 0.1, 0.0, 1.0, 0.7, noise, out[k])
+            np.testing.assert_array_equal(out[k], singles[k].step(row, error=0.1, angle=1.0, rate=0.7))
     assert all(np.isfinite(array).all() for state in states for array in state)
 
 
@@ -335,7 +337,7 @@ def test_an_arm_of_two_flexors_has_nothing_to_co_contract():
     patient, state, out = Patient(co_contraction=0.5), new_effort(np.ones(2), PERIOD), np.empty(2)
     wanted = np.array([0.3, 0.6])
     reset_effort(patient.row(), state, PERIOD, wanted, 0.0)
-    step_effort(patient.row(), state, PERIOD, wanted, 0.0, 0.0, 0.0, out)
+    step_effort(patient.row(), state, PERIOD, wanted, 0.0, 0.0, 1.0, 0.0, 0.0, out)
     np.testing.assert_array_equal(out, wanted)
 
 
