@@ -3,7 +3,8 @@
 For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activations a_k of the motor command:
 
     c_k = delayed(s a_k, neural delay) + sign feedback_gain y^                             what is intended, at least 0
-    T_k = (c_k + co_contraction mean(c of the other group)) / maximum_activation_g         wanted share, at most 1
+    T_k = (c_k + co_contraction mean(c of the other group)) / maximum_activation_g         wanted share, at most 1,
+          with c of the other group up to its maximum_activation
     d_k = maximum_activation_g min(T_k, 1 - M_F,k)                                         voluntary drive
           + delayed(reflex of stretch rate and length, stretch delay)                      stretch_reflex.py
           + sign tremor_amplitude sin(phase)                                               tremor
@@ -160,7 +161,7 @@ def wanted_share(par, state, which, k):
         count = 0
         for j in range(state.sign.shape[0]):
             if state.sign[j] != state.sign[k]:
-                others += state.intents[which, j]
+                others += min(state.intents[which, j], largest_activation(par, state.sign[j]))
                 count += 1
         # An arm may have muscles of one group only.
         others *= par[PATIENT.co_contraction] / max(count, 1)
@@ -176,12 +177,12 @@ def voluntary_drive(par, state, k, share):
 
 
 @compiled
-def reset_effort(par, state, period, wanted, phase):
-    """State of a patient who has wanted `wanted` for long, rested but for what was fatigued before."""
+def reset_effort(par, state, period, wanted, angle, phase):
+    """State of a patient who has wanted `wanted` at an elbow angle [rad] for long, but for what was fatigued before."""
     present = state.present
     present[PRESENT.newest], present[PRESENT.phase] = 0.0, phase
     present[PRESENT.effort] = par[PATIENT.effort_at_start]
-    state.error[:], state.reflex[:], state.copy[:], state.expected[:] = 0.0, 0.0, 0.0, 0.0
+    state.error[:], state.copy[:], state.expected[:] = 0.0, 0.0, 0.0
     state.limb[LIMB.moment], state.limb[LIMB.angle], state.limb[LIMB.rate] = 0.0, 0.0, 0.0
     for k in range(state.sign.shape[0]):
         state.fatigued[k] = par[PATIENT.fatigued_at_start]
@@ -190,7 +191,8 @@ def reset_effort(par, state, period, wanted, phase):
     for k in range(state.sign.shape[0]):
         share = wanted_share(par, state, 1, k)
         state.active[k] = min(share, 1.0 - state.fatigued[k])
-        state.drive[k, :] = voluntary_drive(par, state, k, share)
+        reflex = stretch_reflex(par, state.sign[k], angle, 0.0)
+        state.reflex[k, :], state.drive[k, :] = reflex, voluntary_drive(par, state, k, share) + reflex
 
 
 @compiled

@@ -34,7 +34,7 @@ from exo_env.drives.drive import start_apart
 from exo_env.ecosystem.exoskeleton import link_moment, rope_lever
 from exo_env.ecosystem.gym_machine import clearances
 from exo_env.patient.ability import put_lacking
-from exo_env.patient.effort import TICK, reset_effort, start_excitation
+from exo_env.patient.effort import TICK, largest_activation, reset_effort, start_excitation
 from exo_env.patient.forward_model import put_limb
 from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
@@ -182,6 +182,18 @@ def put_ticks(w, activations, row, interval):
 
 
 @compiled
+def mean_command(w, traits):
+    """Mean activation of each muscle that a patient can give to the command [-], shape (m,)."""
+    wanted, sign = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted), floats(inner(w, WORLD.subject), SUBJECT.sign)
+    mean = np.zeros(sign.shape[0])
+    for i in range(sign.shape[0]):
+        most = largest_activation(traits, sign[i])
+        for k in range(wanted.shape[0]):
+            mean[i] += min(wanted[k, i], most) / wanted.shape[0]
+    return mean
+
+
+@compiled
 def put_patient(w, arm, load, activations):
     """Put traits, need and effort of the patient in their places; fills the activations of the start, shape (m,)."""
     draw, patient, plan = inner(w, WORLD.draw), inner(w, WORLD.patient), inner(w, WORLD.plan)
@@ -198,8 +210,8 @@ def put_patient(w, arm, load, activations):
     effort, wanted = effort_of(w), matrix(patient, PATIENT_TABLES.wanted)[0]
     given, constants = floats(draw, DRAW.given), floats(inner(w, WORLD.scaling), SCALING.constants)
     expected = load_of(w, traits[PATIENT.expected_load] * given[GIVEN.load])
-    put_limb(traits, arm, expected, constants, effort.limb, effort.levers)
-    reset_effort(traits, effort, TICK, wanted, given[GIVEN.phase])
+    put_limb(traits, arm, expected, constants, mean_command(w, traits), effort.limb, effort.levers)
+    reset_effort(traits, effort, TICK, wanted, given[GIVEN.start], given[GIVEN.phase])
     for k in range(activations.shape[0]):
         activations[k] = start_excitation(effort, k)
 

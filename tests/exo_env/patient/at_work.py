@@ -22,10 +22,10 @@ class AtWork:
             self.numbers[PATIENT.feedback_gain] = 0.0
         self.state: EffortState = new_effort(SIGN, period)
 
-    def reset(self, wanted: np.ndarray) -> np.ndarray:
+    def reset(self, wanted: np.ndarray, angle: float = MIDDLE) -> np.ndarray:
         """As one who has wanted `wanted` for long; gives the excitations of that, without tremor."""
         phase = self.generator.uniform(0.0, 2.0 * math.pi)
-        reset_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), phase)
+        reset_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), angle, phase)
         return np.array([start_excitation(self.state, k) for k in range(len(SIGN))])
 
     def step(
