@@ -26,7 +26,7 @@ from dms_core.validation import Checked
 from exo_env.settings import Settings
 
 from ..checkpoint import Store
-from ..environment import PROGRAM, environment_id
+from ..environment import PROGRAM, environment_id, task_type
 from .baselines import POLICIES
 from .baselines import policy as baseline
 from .network import Architecture, Count, Network
@@ -84,13 +84,14 @@ class Description(Settings):
     architecture: Architecture
     steps: Count = Field(description="of training")
     seed: Count | None = None
+    informed: bool = Field(default=False, strict=True, description="may see what reveals the patient's plan")
     weights_sha256: str = ""
     sha256: str = Field(default="", description="of all other keys")
 
     @property
     def common(self) -> str:
         """A digest of all but steps, seed and weights: the same for trainings that differ in nothing but the seed."""
-        apart = {"format", "steps", "seed", "weights_sha256", "sha256", "title"}
+        apart = {"format", "steps", "seed", "informed", "weights_sha256", "sha256", "title"}
         facts = self.model_dump(mode="json", exclude=apart) | {"format": 1}  # as it was in format 1
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -129,7 +130,7 @@ class LearnedPolicy(Policy):
         # A policy's own, where those of baselines are of the class.
         own: dict[str, Any] = {
             "name": name, "title": description.title, "action_mode": description.action_mode,
-            "observation": description.observation, "training": description.common,
+            "observation": description.observation, "training": description.common, "informed": description.informed,
         }  # fmt: skip
         self.__dict__.update(own)
 
@@ -167,6 +168,8 @@ class LearnedPolicy(Policy):
     def reset(self, env: gymnasium.Env) -> None:
         """Forget the last patient; an environment that the policy does not know is refused."""
         facts, d = world_facts(env), self.description
+        if not self._known:
+            self._check_task(env)
         mine, theirs = ([[part[k] for k in COMPARED] for part in parts] for parts in (d.structure, facts["structure"]))
         for what, trained, here in (
             ("observation", mine, theirs),
@@ -181,6 +184,17 @@ class LearnedPolicy(Policy):
         if not self._known:
             self._say_where(env)
         self._known = True
+
+    def _check_task(self, env: gymnasium.Env) -> None:
+        """Refuse another task where either of them hides the plan: what such a policy learned is of no use there."""
+        world: Any = env.unwrapped
+        trained, here = task_type(environment_id(self.description.environment, say=False)), type(world.task)
+        # A task that is another one's subclass is a variant of it, such as one with more windows.
+        if (trained.revealing or here.revealing) and not (issubclass(trained, here) or issubclass(here, trained)):
+            raise InputError(
+                f"policy '{self.name}' was trained for the task {trained.__name__}, and this is {here.__name__}: "
+                "expected a policy that was trained for the same task."
+            )
 
     def _say_where(self, env: gymnasium.Env) -> None:
         """Say where an environment is another one that shows and takes the same: it may reward something else."""

@@ -57,9 +57,7 @@ def tuned(file: str) -> dict[str, Any]:
     return read_yaml(configs() / file)
 
 
-def numbers(
-    policy: str, ranges: Mapping[str, Range], given: Mapping[str, N], file: str = FILE
-) -> dict[str, N]:
+def numbers(policy: str, ranges: Mapping[str, Range], given: Mapping[str, N], file: str = FILE) -> dict[str, N]:
     """All numbers of a policy: those given, and the tuned ones for the rest.
 
     Args:

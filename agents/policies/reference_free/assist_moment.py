@@ -67,8 +67,8 @@ class AssistMoment(BatchPolicy):
         world = one_world(env)
         if self._known_env is not env:
             self.known, self._known_env = Known(world.ecosystem), env
-        self.channels, self.period, self._most = Channels(env), world.period, world.drive.max_moment
-        self.moment, self.n = None, n
+        self.channels, self.period, self._drive = Channels(env), world.period, world.drive
+        self.moment = None
 
     @abstractmethod
     def wanted(self, observations: np.ndarray, seen: Seen) -> np.ndarray:
@@ -87,9 +87,7 @@ class AssistMoment(BatchPolicy):
         self.moment = self.moment + self.kept(self.numbers["smoothing"]) * (
             self.wanted(observations, seen) - self.moment
         )
-        actions = np.full((len(observations), 2), -1.0)
-        actions[:, 0] = np.clip(self.moment / self._most, -1.0, 1.0)
-        return actions
+        return self._drive.action_of(self.moment)
 
     def kept(self, time_constant: Number) -> Number:
         """Share of a new value that a low-pass filter takes over in a control period [-]."""
