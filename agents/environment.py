@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
 __all__ = (
-    "ENVIRONMENT", "PROGRAM", "check_settings", "environment_id", "environments", "hides_plan", "make", "make_sb3_worlds",
-    "make_vector", "patient_seeds", "spec_of", "task_type",
+    "ENVIRONMENT", "PROGRAM", "check_settings", "environment_id", "environments", "hides_plan", "make",
+    "make_sb3_worlds", "make_vector", "patient_seeds", "spec_of", "task_type",
 )  # fmt: skip
 
 ENVIRONMENT = "exo/ElbowLift-v1"

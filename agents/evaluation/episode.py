@@ -11,7 +11,8 @@ from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.patient.population import Source
 from exo_env.tasks.repetition import MOVED, Repetition, Repetitions
 
-from ..environment import ENVIRONMENT, make
+from ..environment import ENVIRONMENT, make, task_type
+from ..policies.learned import LearnedPolicy
 from ..policies.policy import Policy
 from .fair_play import begin, check_fair, shown
 from .measures import Record, left_out, measured
@@ -30,8 +31,10 @@ def world_of(policy: Policy, patient: Source, environment: str = ENVIRONMENT, **
         settings: further ones of the environment.
 
     Raises:
-        InputError: the policy sees what it may not, see fair_play.py.
+        InputError: the policy was trained for another task, or sees what it may not (fair_play.py).
     """
+    if isinstance(policy, LearnedPolicy):
+        policy.check_task(task_type(environment))
     env = make(
         environment, patient=patient, action_mode=policy.action_mode, observation=list(policy.observation), **settings
     )

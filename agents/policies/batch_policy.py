@@ -56,4 +56,4 @@ class BatchPolicy(Policy):
 def one_world(env: gymnasium.Env | VectorEnv) -> Any:
     """The environment itself, or the first of a batch: their settings are the same."""
     whole: Any = env.unwrapped
-    return whole.envs[0] if isinstance(whole, VectorEnv) else whole
+    return getattr(whole, "envs", [whole])[0]

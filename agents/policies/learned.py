@@ -24,6 +24,7 @@ from dms_core.files.json_text import Each, brief, checked, finite, read_json
 from dms_core.files.output_file import write_bytes, write_text
 from dms_core.validation import Checked
 from exo_env.settings import Settings
+from exo_env.tasks.task import Task
 
 from ..checkpoint import Store
 from ..environment import PROGRAM, environment_id, task_type
@@ -169,7 +170,8 @@ class LearnedPolicy(Policy):
         """Forget the last patient; an environment that the policy does not know is refused."""
         facts, d = world_facts(env), self.description
         if not self._known:
-            self._check_task(env)
+            world: Any = env.unwrapped
+            self.check_task(type(world.task))
         mine, theirs = ([[part[k] for k in COMPARED] for part in parts] for parts in (d.structure, facts["structure"]))
         for what, trained, here in (
             ("observation", mine, theirs),
@@ -185,16 +187,25 @@ class LearnedPolicy(Policy):
             self._say_where(env)
         self._known = True
 
-    def _check_task(self, env: gymnasium.Env) -> None:
-        """Refuse another task where either of them hides the plan: what such a policy learned is of no use there."""
-        world: Any = env.unwrapped
-        trained, here = task_type(environment_id(self.description.environment, say=False)), type(world.task)
-        # A task that is another one's subclass is a variant of it, such as one with more windows.
-        if (trained.revealing or here.revealing) and not (issubclass(trained, here) or issubclass(here, trained)):
+    def check_task(self, task: type[Task]) -> None:
+        """Refuse another task where either of them hides the plan: what such a policy learned is of no use there.
+
+        Raises:
+            InputError: names both tasks.
+        """
+        if (self._task.revealing or task.revealing) and not _variants(self._task, task):
             raise InputError(
-                f"policy '{self.name}' was trained for the task {trained.__name__}, and this is {here.__name__}: "
+                f"policy '{self.name}' was trained for the task {self._task.__name__}, and this is {task.__name__}: "
                 "expected a policy that was trained for the same task."
             )
+
+    def knows(self, environment: str) -> bool:
+        """Whether it was trained for the task of an environment, by its id."""
+        return _variants(self._task, task_type(environment))
+
+    @property
+    def _task(self) -> type[Task]:
+        return task_type(environment_id(self.description.environment, say=False))
 
     def _say_where(self, env: gymnasium.Env) -> None:
         """Say where an environment is another one that shows and takes the same: it may reward something else."""
@@ -215,6 +226,11 @@ class LearnedPolicy(Policy):
         if not self._known:
             raise InputError(f"policy '{self.name}' acts without a begin: call reset(env) after the environment's own.")
         return self.network(observation)
+
+
+def _variants(one: type[Task], other: type[Task]) -> bool:
+    """Whether two tasks are the same, or one a variant of the other, such as one with more windows."""
+    return issubclass(one, other) or issubclass(other, one)
 
 
 def _check_registered(environment: str) -> None:

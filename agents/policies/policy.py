@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import VectorEnv
 
 from dms_core.errors import InputError, choices
 
@@ -53,10 +54,10 @@ class Channels:
     """Readings in their units from an observation.
 
     Args:
-        env: whose observations are read.
+        env: whose observations are read; one environment, or many in a batch.
     """
 
-    def __init__(self, env: gymnasium.Env) -> None:
+    def __init__(self, env: gymnasium.Env | VectorEnv) -> None:
         world: Any = env.unwrapped
         self._slices = {f"{part.group}.{part.name}": part for part in world.observation_structure}
 

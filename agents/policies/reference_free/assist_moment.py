@@ -42,7 +42,9 @@ class Seen:
 
 
 class AssistMoment(BatchPolicy):
-    """Base of policies in action mode 'assist_moment'. The numbers of most of them are:
+    """Base of policies in action mode 'assist_moment'.
+
+    The numbers of most of them are:
 
     smoothing   time constant of the low-pass filter of the moment [s]
     share       of the moment that holds arm and lower link, which is given all the time [-]

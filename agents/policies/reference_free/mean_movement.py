@@ -9,8 +9,9 @@ the plan, the first is no better than the second.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import gymnasium
 import numpy as np
@@ -78,7 +79,7 @@ def mean_course(world: Any) -> np.ndarray:
         world: an environment; others of its settings are drawn from.
     """
     given = {name: getattr(world.settings, name) for name in sorted(world.settings.model_fields_set)}
-    return _mean_course(type(world), Given(finite(given)))
+    return _mean_course(cast(Hashable, type(world)), Given(finite(given)))
 
 
 class Given(dict[str, Any]):
@@ -89,8 +90,9 @@ class Given(dict[str, Any]):
 
 
 @lru_cache(maxsize=8)
-def _mean_course(kind: Any, given: Given) -> np.ndarray:
-    env = kind(**{**given, "render_mode": None})
+def _mean_course(kind: Hashable, given: Given) -> np.ndarray:
+    made: Any = kind
+    env = made(**{**given, "render_mode": None})
     total = 0.0
     for k in range(DRAWN):
         env.reset(seed=SEED + k)
