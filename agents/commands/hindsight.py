@@ -20,9 +20,9 @@ from dms_core.files.outputs import OutputFile, Outputs
 from ..environment import PROGRAM, hides_plan
 from ..evaluation.hindsight import hindsight as tried
 from ..evaluation.hindsight import summed_up, tuned_difference
-from ..evaluation.shares import shared_out
 from ..evaluation.tries import KeptTries, Try, beside
 from ..evaluation.tuning import tunable
+from .options import sharing_out
 
 USUAL = "exo/HiddenIntent-v0"
 CLOCK, ANGLE = "mean_clock", "mean_angle"
@@ -65,7 +65,7 @@ def hindsight(
         total = len(names) * tries
         try:
             with (
-                shared_out(workers, address) as share_out,
+                sharing_out(workers, address) as share_out,
                 tqdm(
                     total=total, initial=kept.count, unit="try", leave=False, disable=None, file=sys.stderr
                 ) as bar,

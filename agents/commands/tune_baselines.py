@@ -18,11 +18,10 @@ from dms_core.files.outputs import OutputFile, Outputs
 
 from ..environment import ENVIRONMENT, PROGRAM, hides_plan
 from ..evaluation.opponents import RETURNS
-from ..evaluation.shares import shared_out
 from ..evaluation.tries import KeptTries, Try, beside, table
 from ..evaluation.tuning import POPULATION, tunable, tune, untuned
 from ..policies.tuned import FILE, HIDDEN_INTENT
-from .options import device_settings
+from .options import device_settings, sharing_out
 
 
 def tune_baselines(
@@ -69,7 +68,7 @@ def tune_baselines(
         total = len(names) * tries
         common = {"population": population, "environment": environment, "repetitions": repetitions, **settings}
         try:
-            with shared_out(workers, address) as share_out, _bar(total, kept.count) as bar:
+            with sharing_out(workers, address) as share_out, _bar(total, kept.count) as bar:
 
                 def progress(one: Try) -> None:
                     kept.add(one)

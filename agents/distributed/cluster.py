@@ -50,7 +50,7 @@ def share_out(
     Raises:
         DmsError: Ray is missing or cannot be reached, a call failed, or a share lost its worker too often.
     """
-    with _errors_in_words(), _cluster(address, cpus) as ray:
+    with _cluster(address, cpus) as ray:
         results: list[Any] = [None] * len(shares)
         for k, result in _each(ray, function, shares, waiting):
             results[k] = result
@@ -69,7 +69,7 @@ def connected(address: str | None, cpus: int | None = None) -> Iterator[Callable
     Raises:
         DmsError: as `share_out`.
     """
-    with _errors_in_words(), _cluster(address, cpus) as ray:
+    with _cluster(address, cpus) as ray:
 
         def each(function: Callable[..., Any], shares: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
             results: dict[int, Any] = {}
@@ -99,34 +99,25 @@ def _each(
 
 @contextlib.contextmanager
 def _cluster(address: str | None, cpus: int | None) -> Iterator[Any]:
-    """Ray, connected within."""
+    """Ray, connected within; its errors, and those of workers, become ours."""
     ray = _started(address, cpus)
     try:
         yield ray
-    finally:
-        ray.shutdown()
-
-
-@contextlib.contextmanager
-def _errors_in_words() -> Iterator[None]:
-    """Errors of Ray and of workers as ours."""
-    try:
-        import ray
-    except ImportError:
-        raise DmsError(f"Ray is missing. {extra('sweep')}") from None
-    try:
-        yield
     except ray.exceptions.RayTaskError as error:
         raise DmsError(str(error.cause) if isinstance(error.cause, DmsError) else f"a worker failed: {error}") from None
     except ray.exceptions.RayError as error:
         reason = " ".join(str(error).split())[:200]
         raise DmsError(f"a share lost its worker {RETRIES + 1} times; not enough memory? Ray says: {reason}") from None
+    finally:
+        ray.shutdown()
 
 
 def _started(address: str | None, cpus: int | None) -> Any:
     """Ray, connected."""
-    import ray
-
+    try:
+        import ray
+    except ImportError:
+        raise DmsError(f"Ray is missing. {extra('sweep')}") from None
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
     try:
         if address is None:

@@ -1,4 +1,4 @@
-"""Shares of a long work, done by processes of this machine or by Ray; what comes of each is given as it is done."""
+"""Shares of a long work, done by processes of this machine; what comes of each is given as it is done."""
 
 from __future__ import annotations
 
@@ -30,19 +30,6 @@ def processes(workers: int) -> Iterator[ShareOut]:
             for child in set(multiprocessing.active_children()) - before:
                 child.kill()
             raise
-
-
-@contextlib.contextmanager
-def shared_out(workers: int, address: str | None) -> Iterator[ShareOut]:
-    """Processes of this machine, or Ray where an address is given: of a cluster, or 'local' for one of this machine."""
-    if address is None:
-        with processes(workers) as each:
-            yield each
-    else:
-        from ..distributed.cluster import connected
-
-        with connected(None if address == "local" else address, cpus=workers) as each:
-            yield each
 
 
 def _leave_signals_alone() -> None:
