@@ -28,7 +28,7 @@ __all__ = (
     "make_sb3_worlds", "make_vector", "patient_seeds", "spec_of", "task_type",
 )  # fmt: skip
 
-ENVIRONMENT = "exo/ElbowLift-v1"
+ENVIRONMENT = "exo/ElbowLift-v2"
 """The environment where none is named."""
 PROGRAM = f"python -m {__name__.partition('.')[0]}"
 """This command line, under the name by which it is installed."""

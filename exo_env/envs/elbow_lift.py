@@ -1,4 +1,4 @@
-"""The environment exo/ElbowLift-v1."""
+"""The environment exo/ElbowLift-v2."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIME = 6.0
 
 
 class ElbowLiftSettings(EnvSettings):
-    """The arguments of exo/ElbowLift-v1."""
+    """The arguments of exo/ElbowLift-v2."""
 
     repetitions: Any = Field(default=1, description="number of repetitions in an episode")
 
@@ -97,11 +97,12 @@ class ElbowLiftEnv(AssistanceEnv):
     `ability`, the share of arm and load that the patient can hold (`exo_env/patient/ability.py`).
 
     ## Episode End
-    Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
+    Terminated, with a sentence in `info["event"]`, when the elbow leaves -5 to 147 deg, a rope exceeds 1000 N, the
     elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
-    `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), or as long for each of
-    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`, and the spec of
-    an environment says its own.
+    `info["solver_failed"]` is true). The elbow has stops at 0 and 142 deg, which yield by less than 3 deg where an arm
+    falls straight; at rest against a stop is no event, far beyond one is. Truncated after `episode_duration` (6 s), or
+    as long for each of several repetitions, at whatever control rate; so the registration has no `max_episode_steps`,
+    and the spec of an environment says its own.
 
     ## Arguments
     All by keyword, all JSON.
@@ -132,6 +133,8 @@ class ElbowLiftEnv(AssistanceEnv):
     of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
 
     ## Version History
+    * v2: the rest before a lift is drawn, so that the time does not tell when it begins; elbows have stops, and a straight
+      arm rests; the patient acts at a rate of its own and predicts through its delays; other action modes
     * v1: every number of an episode has a random stream of its own, so that other patients are drawn; physics, rewards
       and observations are those of v0
     * v0: first version

@@ -13,7 +13,7 @@ import numpy as np
 from dms_core import Model, SolverOptions, World
 from dms_core.errors import InputError, SimulationError
 from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
-from dms_core.model import MinimumJerk, Pid, RopeActuator
+from dms_core.model import ImpedanceController, MinimumJerk, Pid, RopeActuator
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
 from exo_env.drives.checked import check_motors
@@ -22,7 +22,7 @@ from exo_env.ecosystem.arm import excitation_name
 from exo_env.ecosystem.ecosystem import REFERENCE, Ecosystem
 from exo_env.ecosystem.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
 from exo_env.ecosystem.person import SEXES
-from exo_env.ecosystem.worn_exoskeleton import LOWER, PID
+from exo_env.ecosystem.worn_exoskeleton import HINGE, LOWER, PID
 from exo_env.patient.ability import Need
 from exo_env.patient.effort import new_effort
 from exo_env.patient.motor_command import arm_table, load_table, unsettled
@@ -233,12 +233,14 @@ class PatientWorld:
         at, calls = self.model.layout.offset, self.model.tables.values.constraints
         joints = [c.element.name for c in self.model.layout.constraints]
         added = [f.offset for f in self.model.system.forces if isinstance(f, Pid) and f.name == PID and f.offset]
+        springs = [f for f in self.model.system.forces if isinstance(f, ImpedanceController) and f.joint == HINGE]
         return RestTables(
             orientation=self._worn.orientation, misaligned=np.array([int(not self._worn.aligned)]),
             shift=np.ascontiguousarray(self._worn.shift), guided=np.ascontiguousarray(self._worn.guided_point),
             link_centre=np.array(self.ecosystem.device.lower_link.centre_of_mass),
             places=np.array([at[name] for name in NAMES_AT_REST]), fibres=np.array([at[m] for m in self._arm.muscles]),
             offset=np.array([self.model.layout.index[name] for name in added], np.int64),
+            zeros=np.array([self.model.layout.index[f"{f.name}.zero"] for f in springs], np.int64),
             rope=calls.par_ptr[[joints.index(ROPE)]], v=np.zeros(self.model.n_q),
         )  # fmt: skip
 

@@ -192,7 +192,7 @@ def test_generators_go_along_and_are_the_copys_own(way):
 
 @pytest.mark.parametrize("way", ["deepcopy", "pickle", "cloudpickle"])
 def test_wrappers_go_along(way):
-    env = RecordEpisodeStatistics(gymnasium.make("exo/ElbowLift-v1", episode_duration=0.4, max_episode_steps=15))
+    env = RecordEpisodeStatistics(gymnasium.make("exo/ElbowLift-v2", episode_duration=0.4, max_episode_steps=15))
     env.reset(seed=0)
     for _ in range(6):
         env.step(HOLD.astype(np.float32))
@@ -275,7 +275,7 @@ def test_files_are_read_when_an_environment_is_made(files, tmp_path):
 @pytest.mark.parametrize("vector", [False, True])
 def test_a_spec_names_files_by_their_whole_paths(files, tmp_path, monkeypatch, vector):
     make = gymnasium.make_vec if vector else gymnasium.make
-    first = make("exo/ElbowLift-v1", **files)
+    first = make("exo/ElbowLift-v2", **files)
     assert first.spec.kwargs | {k: str(tmp_path / f) for k, f in files.items()} == first.spec.kwargs
     (tmp_path / "other").mkdir()
     monkeypatch.chdir(tmp_path / "other")

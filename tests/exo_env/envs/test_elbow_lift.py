@@ -38,7 +38,7 @@ def test_readings_hold_what_the_figures_show(env):
 
 @pytest.mark.filterwarnings("ignore:.*out of date")
 def test_the_old_version_names_the_new_one():
-    with pytest.raises(gymnasium.error.DeprecatedEnv, match="exo/ElbowLift-v1"):
+    with pytest.raises(gymnasium.error.DeprecatedEnv, match="exo/ElbowLift-v2"):
         gymnasium.make("exo_env:exo/ElbowLift-v0")
 
 

@@ -12,7 +12,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo
 
-ID = "exo/ElbowLift-v1"
+ID = "exo/ElbowLift-v2"
 ACTION = np.array([-0.4, -0.9], np.float32)
 
 
@@ -43,7 +43,7 @@ def test_spec_goes_through_json(make):
 
 RUN = """
 import numpy as np, gymnasium, exo_env, sys
-env = gymnasium.make("exo/ElbowLift-v1", observation=["device", "emg", "privileged"]).unwrapped
+env = gymnasium.make("exo/ElbowLift-v2", observation=["device", "emg", "privileged"]).unwrapped
 {before}
 found = [env.reset(seed=int(sys.argv[1]))[0]]
 for k in range(30):

@@ -49,6 +49,8 @@ def test_numbers_in_the_text_are_those_of_the_settings():
         f"{drive.rate_limit:g} N/s and follow with a lag of {drive.time_constant:g} s",
         f"filter of {pid.filter_frequency:g} rad/s; its authority changes by at most {pid.authority_rate:g} 1/s",
         f"the elbow leaves {limits.lowest_deg:g} to {limits.highest_deg:g} deg",
+        "The elbow has stops at {:g} and {:g} deg".format(*env.ecosystem.arm().within_stops(-180.0, 180.0)),
+        "`initial_angle_deg` ({:g} to {:g})".format(*env.ecosystem.arm().within_stops(*env.task.start_range())),
         f"a rope exceeds {limits.tension:g} N",
         f"elbow reaction exceeds {limits.reaction:g} N",
         f"`episode_duration` ({env.duration:g} s)",

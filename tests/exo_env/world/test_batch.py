@@ -13,7 +13,7 @@ from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.world import batch as batch_module
 from exo_env.world.batch import Batch
 
-ENV = "exo_env:exo/ElbowLift-v1"
+ENV = "exo_env:exo/ElbowLift-v2"
 SHORT = {"episode_duration": 0.5, "observation": ["device", "emg", "privileged"]}
 
 
