@@ -54,7 +54,9 @@ def test_half_the_way_is_a_half_whatever_patients_do():
 
 def test_nothing_is_clipped():
     low, high = sample()
-    worse, better = (gap_closed(episodes(x), episodes(low), episodes(high), 0) for x in (2 * low - high, 2 * high - low))
+    worse, better = (
+        gap_closed(episodes(x), episodes(low), episodes(high), 0) for x in (2 * low - high, 2 * high - low)
+    )
     assert worse["value"] == pytest.approx(-1.0) and better["value"] == pytest.approx(2.0)
 
 
@@ -145,7 +147,9 @@ def test_no_gap_is_said_with_its_reason_once():
     for p in found["policies"].values():
         p["summary"][GAP] |= {"value": math.nan, "reason": "nobody knows"}
     first, second = gap_lines(found)
-    assert first.startswith("Gap closed: from ") and second == f"No gap for {', '.join(found['policies'])}: nobody knows."
+    assert (
+        first.startswith("Gap closed: from ") and second == f"No gap for {', '.join(found['policies'])}: nobody knows."
+    )
     assert "gap closed" in short_table(found) and "| gap closed | - |" in "\n".join(whole_table(found))
 
 
