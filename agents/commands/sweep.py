@@ -13,7 +13,7 @@ from dms_core.errors import Stopped
 from dms_core.files.output_place import check_folder
 
 from ..distributed.cluster import share_out
-from ..distributed.sweep import planned, steps_of, train_share
+from ..distributed.sweep import in_order, planned, steps_of, train_share
 from ..environment import PROGRAM
 from ..training.config import Config
 from ..training.usable import require_training
@@ -29,6 +29,8 @@ def sweep(
     environment: Annotated[str | None, arg(name="env", metavar="ID")] = None,
 ) -> int:
     """Train every configuration with every seed; the same command again goes on where it was stopped.
+
+    A training that learns from another of them (training.imitation.teacher, training.initial) waits for it.
 
     Args:
         configs: YAML files in the format of rl_zoo3, as in configs/agents.
@@ -49,13 +51,16 @@ def sweep(
             bar.update(min(sum(steps_of(Path(folder)) for _, _, folder in shares), total) - bar.n)
 
         try:
-            best_ones = share_out(
-                train_share, shares, address=address, cpus=cpus, waiting=show_progress,
-                done=lambda k: bar.write(f"done: {shares[k][2]}"),
-            )  # fmt: skip
+            best_ones = []
+            for group in in_order(shares):
+                best_ones += share_out(
+                    train_share, group, address=address, cpus=cpus, waiting=show_progress,
+                    done=lambda k, group=group: bar.write(f"done: {group[k][2]}"),
+                )  # fmt: skip
         except KeyboardInterrupt:
             raise Stopped("the same command goes on from the last checkpoints.") from None
-    for (_, _, folder), best in zip(shares, best_ones, strict=True):
+    done = [share for group in in_order(shares) for share in group]
+    for (_, _, folder), best in zip(done, best_ones, strict=True):
         print(f"{folder}: best return {best['return']:.4g} after {best['steps']} steps")
     print(f"figures: {PROGRAM} report {' '.join(folder for _, _, folder in shares)} --out {out / 'report'}")
     return 0

@@ -19,7 +19,7 @@ from dms_core.errors import InputError, Stopped
 
 from ..environment import PROGRAM, environment_id
 from ..evaluation.episode import judged
-from ..training.usable import checked_config, require_training
+from ..training.usable import check_other_policies, checked_config, require_training
 
 BAR = "{percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt} steps, {rate_fmt}, {elapsed} passed, {remaining} left"
 
@@ -107,6 +107,8 @@ def _begun(
     used = checked_config(config, changes, environment)
     folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
     folder.check_new()
+    used = used.placed(folder.path, seed)
+    check_other_policies(used)
     with folder.locked():
         folder.begin(used, seed)
         yield folder, used, seed

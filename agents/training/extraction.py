@@ -111,7 +111,9 @@ def actor_parameters(model: BaseAlgorithm) -> dict[str, torch.Tensor]:
     policy: Any = model.policy
     squashed = _squashed(model)
     parts = (
-        [*policy.actor.latent_pi, policy.actor.mu] if squashed else [*policy.mlp_extractor.policy_net, policy.action_net]
+        [*policy.actor.latent_pi, policy.actor.mu]
+        if squashed
+        else [*policy.mlp_extractor.policy_net, policy.action_net]
     )
     known: Any = (nn.Linear, *ACTIVATIONS.values())
     if not all(isinstance(p, known) for p in parts) or getattr(policy, "squash_output", False) != squashed:
@@ -140,4 +142,3 @@ def _activation(model: BaseAlgorithm) -> str:
         if policy.activation_fn is kind:
             return name
     raise InputError(f"activation {policy.activation_fn.__name__} is not one of {', '.join(ACTIVATIONS)}.")
-
