@@ -58,6 +58,8 @@ class DriveTables(NamedTuple):
     """Coordinate of each motor or filter that follows a command, and the command's number, shape (k, 2)."""
     rows: Kept
     """Row of each command in the signals of the world, shape (n_c,)."""
+    hinge: Kept
+    """Place in y of the angle that the device measures at its hinge, shape (1,)."""
     axes: Kept
     """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
     action: Cleared
@@ -106,6 +108,10 @@ class PlanTables(NamedTuple):
     """How far ahead the reference is shown [s]."""
     preview: Cleared
     """psi that far ahead at each control time, shape (k, n)."""
+    loads: Filled
+    """Weight on the machine at each control time [kg], shape (k,)."""
+    needed: Filled
+    """Moment that arm and load need along psi at each control time [Nm], shape (k,)."""
     lacking: Cleared
     """What the patient cannot give of the needed moment at each control time [Nm], shape (k,)."""
     scale: Cleared
@@ -167,6 +173,8 @@ class DrawTables(NamedTuple):
     """Row of the patient."""
     movement: Filled
     """Numbers of the movement."""
+    task: Filled
+    """Numbers that the task draws, in the order of `Task.draws`."""
     given: Filled
     """Load, angle and phase of the start, at the places of GIVEN."""
 

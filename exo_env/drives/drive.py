@@ -4,8 +4,9 @@ A drive is the part of the model behind the ropes, and how actions become its in
 declares its action's components, its commands (inputs of the model, each with a largest rate) and its forces, and a
 compiled kernel that says what each command is to be at the end of the coming control period:
 
-    kernel(w)      reads floats(drive, DRIVE.action), floats(drive, DRIVE.numbers) and, if it likes, the readings of
-                   the task; writes floats(drive, DRIVE.wanted); drive = inner(w, WORLD.drive)
+    kernel(w)      reads floats(drive, DRIVE.action), floats(drive, DRIVE.numbers) and, if it likes, the hinge's angle,
+                   `measured_hinge(w)`, which every world has, or readings of the task, which another task may lack;
+                   writes floats(drive, DRIVE.wanted); drive = inner(w, WORLD.drive)
 
 A command goes linearly from its last value to the new one over the period, as far as its largest rate takes it, so that
 rates hold at all times and nothing jumps inside the solver.
@@ -31,7 +32,7 @@ from dms_core.validation import shown
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.settings import Settings
-from exo_env.tables import DRAW, DRIVE, GIVEN, PLAN, STATUS, WORLD
+from exo_env.tables import DRAW, DRIVE, DYNAMICS, GIVEN, PLAN, STATUS, WORLD
 
 RETURN = 2.0
 """Time in which a setpoint goes from where the arm begins to psi [s]; assumed: that of a slow move of the exercise."""
@@ -100,6 +101,12 @@ def affine(w):
     action, wanted, x = floats(drive, DRIVE.action), floats(drive, DRIVE.wanted), matrix(drive, DRIVE.numbers)
     for i in range(wanted.shape[0]):
         wanted[i] = x[i, 0] + x[i, 1] * action[i]
+
+
+@compiled
+def measured_hinge(w):
+    """Angle of the device's hinge at the present control time [rad]."""
+    return floats(inner(w, WORLD.dynamics), DYNAMICS.y)[ints(inner(w, WORLD.drive), DRIVE.hinge)[0]]
 
 
 @compiled

@@ -91,6 +91,7 @@ class EpisodeDraws:
         movement_of: makes another movement from what a reset option gives.
         duration: length of an episode [s].
         start_range: elbow angles at which an episode may begin [deg].
+        of_task: distributions of the numbers that the task draws, by name.
 
     Raises:
         InputError: the movement may start where no episode may.
@@ -104,7 +105,9 @@ class EpisodeDraws:
         movement_of: Callable[[Any], Movement],
         duration: float,
         start_range: tuple[float, float],
+        of_task: Mapping[str, Distribution],
     ) -> None:
+        self._of_task = Draws({f"task.{name}": spread for name, spread in of_task.items()})
         self.movement_of, self.duration, self.start_range = movement_of, duration, start_range
         self.sources = self._checked(Sources(patients, Draws({LOAD: load}), movement))
 
@@ -163,4 +166,4 @@ class EpisodeDraws:
             start_deg = float(numbers[sources.movement.names.index(START)])
         phase = 2.0 * math.pi * uniform(k, PHASE, 0)
         patient, load = sources.patients.draw(k), float(sources.loads.sample(k)[0])
-        return Draw(key, patient, load, numbers, math.radians(start_deg), phase)
+        return Draw(key, patient, load, numbers, self._of_task.sample(k), math.radians(start_deg), phase)

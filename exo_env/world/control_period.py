@@ -39,6 +39,7 @@ from exo_env.tables import (
 )
 from exo_env.tasks.noise import imperfect
 from exo_env.tasks.task import SOLVER
+from exo_env.world.load_step import put_load
 
 
 @compiled
@@ -174,6 +175,7 @@ def run_period(w, action):
     for i in range(now.shape[0]):
         before[i] = now[i]
         now[i] = action[i]
+    put_load(w)
     set_commands(w)
     set_excitations(w)
     code = move(w)

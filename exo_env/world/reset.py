@@ -37,7 +37,15 @@ from exo_env.patient.ability import put_lacking
 from exo_env.patient.effort import reset_effort, start_excitation
 from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
-from exo_env.patient.static_optimisation import ArmTable, LoadTable, interpolated, muscle_moment, needed_moment, planned
+from exo_env.patient.static_optimisation import (
+    ArmTable,
+    LoadTable,
+    interpolated,
+    muscle_moment,
+    needed_moment,
+    needed_moments,
+    planned,
+)
 from exo_env.streams import fill_normals
 from exo_env.tables import (
     DRAW,
@@ -57,6 +65,7 @@ from exo_env.tables import (
 from exo_env.tasks.course import course_of
 from exo_env.tasks.noise import IMPERFECTION
 from exo_env.world.control_period import begin, effort_of, options_of
+from exo_env.world.load_step import CONSTRAINTS
 from exo_env.world.rest_pose import MOVING, hinge_angle, hinge_transmission, put_rest
 from exo_env.world.scaling import put_numbers
 
@@ -64,6 +73,8 @@ STILL, BESIDE = 1e-9, 2
 """Rate of psi below which it rests [rad/s]; samples planned on either side of a movement."""
 FIRST_STEP = 0.5
 """First step tried in an episode, over the control period: inputs leave rest along straight lines of that length."""
+SAME_TIME = 1e-6
+"""Part of a control period by which a time may lie before a control time and still be that time."""
 CLOSED = 1e-10
 """Largest |phi| of a start [m or -], as in dms_core's assembly."""
 BEGUN, PULLEY_IN_REACH, UNSETTLED, NO_RATES, GAPING = range(5)
@@ -120,11 +131,12 @@ def draw_noise(w):
 
 @compiled
 def put_course(w):
-    """Put the movement into the signal of psi, its course and its preview."""
+    """Put the movement into the signal of psi, its course and its preview, and the weight at each control time."""
     plan, period = inner(w, WORLD.plan), floats(w, WORLD.period)[0]
     movement, drawn_movement = floats(plan, PLAN.movement), floats(inner(w, WORLD.draw), DRAW.movement)
     for i in range(movement.shape[0]):
         movement[i] = drawn_movement[i]
+    floats(plan, PLAN.loads)[:] = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.load]
     call_with_table(ints(plan, PLAN.kernel)[0], w)
     t, c, course = floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients), matrix(plan, PLAN.course)
     preview, horizons, n = matrix(plan, PLAN.preview), floats(plan, PLAN.horizons), course.shape[0]
@@ -142,28 +154,37 @@ def put_course(w):
 
 
 @compiled
-def put_command(w, arm, load):
+def put_command(w, arm, load, expected):
     """Fill the motor command at each control time; gives the estimated error in an activation.
 
     A long rest is planned once.
+
+    Args:
+        w: the packed world.
+        arm: an ArmTable.
+        load: a LoadTable.
+        expected: weight that the patient expects over the real one [-].
     """
     plan, times, moves = inner(w, WORLD.plan), floats(inner(w, WORLD.subject), SUBJECT.times), False
-    n = times.shape[0]
-    course, row = np.empty((n, 3)), np.zeros(n, np.int64)
+    n, loads, period = times.shape[0], floats(plan, PLAN.loads), floats(w, WORLD.period)[0]
+    course, row, weights = np.empty((n, 3)), np.zeros(n, np.int64), np.empty(n)
     course_of(floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients), times, course)
     for k in range(n):
-        if abs(course[k, 1]) > STILL:
+        weights[k] = expected * loads[min(int(times[k] / period + SAME_TIME), loads.shape[0] - 1)]
+    for k in range(n):
+        if abs(course[k, 1]) > STILL or weights[k] != weights[max(k - 1, 0)]:
             moves = True
             for i in range(max(k - BESIDE, 0), min(k + BESIDE + 1, n)):
                 row[i] = 1
     count = 0
     for k in range(n):
         if row[k] == 1 or (not moves and k < BESIDE):
-            course[count] = course[k]
+            course[count], weights[count] = course[k], weights[k]
             count += 1
         row[k] = max(count - 1, 0)
     moment, activations = np.empty(count), np.empty((count, arm.sign.shape[0]))
-    _, left = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION_APART, SETTLED, moment, activations)
+    needed_moments(arm, load, weights[:count], course[:count], moment)
+    _, left = planned(arm, times[1], course[:count], moment, SWEEPS, RELAXATION_APART, SETTLED, activations)
     wanted = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted)
     interpolated(activations, row, times[1], floats(w, WORLD.period)[0], wanted)
     return left
@@ -181,7 +202,10 @@ def put_patient(w, arm, load, activations):
     for k in range(shown.shape[0]):
         readings[shown[k, 0]] = row[shown[k, 1]]
     link = floats(inner(w, WORLD.subject), SUBJECT.link)
-    ability, scale = put_lacking(traits, arm, load, link, matrix(plan, PLAN.course), floats(plan, PLAN.lacking))
+    ability, scale = put_lacking(
+        traits, arm, load, floats(plan, PLAN.loads), link, matrix(plan, PLAN.course), floats(plan, PLAN.needed),
+        floats(plan, PLAN.lacking),
+    )  # fmt: skip
     floats(w, WORLD.outcome)[OUTCOME.ability], floats(plan, PLAN.scale)[0] = ability, scale
     effort, wanted = effort_of(w), matrix(patient, PATIENT_TABLES.wanted)[0]
     reset_effort(traits, effort, floats(w, WORLD.period)[0], wanted, floats(draw, DRAW.given)[GIVEN.phase])
@@ -225,7 +249,7 @@ def put_world(w, arm, load, activations):
     q, v, psi = floats(scaling, SCALING.start), floats(rest, REST.v), matrix(inner(w, WORLD.plan), PLAN.course)[0, 0]
     angle = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start]
     rope = put_rest(w, arm, load, angle, psi, activations, q, v)
-    floats(inner(scaling, SCALING.targets), 1)[ints(rest, REST.rope)[0]] = rope
+    floats(inner(scaling, SCALING.targets), CONSTRAINTS)[ints(rest, REST.rope)[0]] = rope
     motors, commands = inner(drive, DRIVE.motors), floats(drive, DRIVE.commands)
     for k in range(motors.shape[0]):
         q[motors[k, 0]] = commands[motors[k, 1]]
@@ -255,14 +279,14 @@ def settle(w):
 def begin_drawn(w):
     """Begin the episode whose numbers, those of the noise included, are in their places; gives what came of it."""
     draw = inner(w, WORLD.draw)
-    put_numbers(w)
+    put_numbers(w, floats(draw, DRAW.given)[GIVEN.load])
     weight = floats(draw, DRAW.given)[GIVEN.load]
     arm, load = arm_of(w), load_of(w, weight)
     activations = np.empty(arm.sign.shape[0])
     if not pulleys_out_of_reach(w, arm, load):
         return PULLEY_IN_REACH
     put_course(w)
-    left = put_command(w, arm, load_of(w, floats(draw, DRAW.patient)[PATIENT.expected_load] * weight))
+    left = put_command(w, arm, load, floats(draw, DRAW.patient)[PATIENT.expected_load])
     floats(w, WORLD.outcome)[OUTCOME.left] = left
     if not left < SETTLED:
         return UNSETTLED

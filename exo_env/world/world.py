@@ -155,6 +155,7 @@ class PatientWorld:
             steps=np.array([c.rate for c in commands]) * self.period, start=self.drive.start_table(device),
             motors=np.array(motors, np.int64).reshape(-1, 2),
             rows=np.array([self._row(c.name) for c in commands], np.int64),
+            hinge=np.array([self.names["exo_angle.angle"]], np.int64),
             axes=np.ascontiguousarray(self._worn.frame), action=np.zeros(len(actions)), before=np.zeros(len(actions)),
             wanted=np.zeros(n), commands=np.zeros(n),
         )  # fmt: skip
@@ -172,11 +173,11 @@ class PatientWorld:
     def _plan(self) -> PlanTables:
         signals, k, n = self.dynamics.state.signals, self.model.input_index(REFERENCE), len(self.times)
         first, end = int(signals.ptr[k]), int(signals.ptr[k + 1])
-        numbers = len(self.movement.names) + len(self.movement.episode_numbers(self.duration))
         return PlanTables(
-            kernel=_address(self.movement.kernel), movement=np.zeros(numbers), starts=signals.t[first:end],
-            coefficients=signals.c[first:end], course=np.zeros((n, 3)), horizons=np.array(self.task.preview, float),
-            preview=np.zeros((n, len(self.task.preview))), lacking=np.zeros(n), scale=np.zeros(1),
+            kernel=_address(self.movement.kernel), movement=np.zeros(self.movement.size(self.duration)),
+            starts=signals.t[first:end], coefficients=signals.c[first:end], course=np.zeros((n, 3)),
+            horizons=np.array(self.task.preview, float), preview=np.zeros((n, len(self.task.preview))),
+            loads=np.zeros(n), needed=np.zeros(n), lacking=np.zeros(n), scale=np.zeros(1),
         )  # fmt: skip
 
     def _task(self) -> TaskTables:
@@ -202,8 +203,8 @@ class PatientWorld:
         )  # fmt: skip
 
     def _draw(self) -> DrawTables:
-        numbers = len(self.movement.names) + len(self.movement.episode_numbers(self.duration))
-        return DrawTables(np.zeros(1, np.int64), np.zeros(len(FIELDS)), np.zeros(numbers), np.zeros(len(GIVEN)))
+        movement, task = np.zeros(self.movement.size(self.duration)), np.zeros(len(self.task.draws()))
+        return DrawTables(np.zeros(1, np.int64), np.zeros(len(FIELDS)), movement, task, np.zeros(len(GIVEN)))
 
     def _scaled(self) -> ScalingTables:
         numbers, defaults = np.zeros(len(self._scaling.coefficients(SEXES[0]))), self._arm.facts["muscle_defaults"]
@@ -248,7 +249,7 @@ class PatientWorld:
         into = self.tables.draw
         self._scaling.coefficients(SEXES[int(draw.patient[PATIENT.sex])])
         into.key[:] = np.uint64(draw.key).view(np.int64)
-        into.patient[:], into.movement[:] = draw.patient, draw.movement
+        into.patient[:], into.movement[:], into.task[:] = draw.patient, draw.movement, draw.task
         into.given[:] = draw.load, draw.start, draw.phase
 
     def begin(self) -> int:
@@ -285,8 +286,8 @@ class PatientWorld:
         plan, draw = self.tables.plan, self.tables.draw
         need = Need(float(outcome[OUTCOME.ability]), plan.lacking.copy(), float(plan.scale[0]))
         load, start, phase = draw.given.tolist()
-        drawn = Draw(int(draw.key.view(np.uint64)[0]), draw.patient.copy(), load, draw.movement.copy(), start, phase)
-        return drawn, need
+        key, numbers = int(draw.key.view(np.uint64)[0]), (draw.movement.copy(), draw.task.copy())
+        return Draw(key, draw.patient.copy(), load, *numbers, start, phase), need
 
 
 def _address(kernel: object) -> np.ndarray:
