@@ -138,7 +138,7 @@ def policies(name: str) -> list[str]:
 
 def allowed(taker: Callable[..., Any]) -> dict[str, Any]:
     """Keys that may be given, with their types."""
-    taken = inspect.signature(taker).parameters.values()
+    taken = inspect.signature(taker, eval_str=True).parameters.values()
     refused = {*NOT_GIVEN, *(STATE_DEPENDENT if any(taker is find(n) for n in SQUASHED) else ())}
     return {p.name: p.annotation for p in taken if p.name not in refused and not p.name.endswith("_class")}
 

@@ -70,7 +70,10 @@ def check_fixed(before: Mapping[str, Any], config: Config, folder: Path) -> None
     """
     # A version that knows further keys of `training` finds their defaults, under which the training began.
     defaults = dict(_leaves({TRAINING: json.loads(Training(algorithm="").model_dump_json())}))
-    then, now = defaults | dict(_leaves(before)), dict(_leaves(fixed_values(config)))
+    began = dict(_leaves(before))
+    # A default that is no mapping stands in no file whose value is one.
+    defaults = {key: value for key, value in defaults.items() if not any(k.startswith(f"{key}.") for k in began)}
+    then, now = defaults | began, dict(_leaves(fixed_values(config)))
     changed = [key for key in (then | now) if then.get(key, ABSENT) != now.get(key, ABSENT) and key not in MAY_CHANGE]
     if not changed:
         return
