@@ -106,9 +106,9 @@ def _begun(
     # A mistake shall not leave a folder behind.
     used = checked_config(config, changes, environment)
     folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
-    folder.check_new()
     used = used.placed(folder.path, seed)
     check_other_policies(used)
+    folder.check_new()
     with folder.locked():
         folder.begin(used, seed)
         yield folder, used, seed
