@@ -26,7 +26,7 @@ __all__ = (
     "make_vector", "patient_seeds", "spec_of",
 )  # fmt: skip
 
-ENVIRONMENT = "exo/ElbowLift-v1"
+ENVIRONMENT = "exo/ElbowLift-v2"
 """The environment where none is named."""
 PROGRAM = f"python -m {__name__.partition('.')[0]}"
 """This command line, under the name by which it is installed."""

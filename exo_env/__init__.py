@@ -22,7 +22,7 @@ moved_modules("exo_env", MOVED, NAMES)
 # Gymnasium's passive checker takes a first reset that raised for done, and breaks at the next step; the environment
 # checks its arguments itself.
 for name, place in (
-    ("ElbowLift-v1", "elbow_lift:ElbowLift"),
+    ("ElbowLift-v2", "elbow_lift:ElbowLift"),
     ("HiddenIntent-v0", "hidden_intent:HiddenIntent"),
     ("NewPatient-v0", "hidden_intent:NewPatient"),
 ):

@@ -20,6 +20,10 @@ STATUS = places(("step", "code", "event"))
 """Places in `WorldTables.status`: control periods done, code of the solver, event that ended the episode."""
 GIVEN = places(("load", "start", "phase"))
 """Places in `DrawTables.given`: weight on the machine [kg], elbow angle and phase of the tremor at the start [rad]."""
+START = places(("always", "holds", "apart", "carried_cos", "carried_sin"))
+"""Places in a column of `DriveTables.start`: the value of a command, the most that it takes of what holds the arm, what
+it has for each radian by which the arm begins beyond psi, and the moment that a unit of it gives, as m_c and m_s [Nm],
+zeros where it is a tension of its own [N]."""
 FELT = places(("angle", "rate"))
 """Places in `PatientTables.felt`: angle [rad] and rate [rad/s] of the elbow."""
 OUTCOME = places(("ability", "left", "gap"))
@@ -52,8 +56,7 @@ class DriveTables(NamedTuple):
     steps: Kept
     """Largest change of each command in a control period, shape (n_c,)."""
     start: Kept
-    """What each command is at the start, the most that it takes of the holding tension, and what it has for each radian
-    by which the arm begins beyond psi, shape (3, n_c)."""
+    """What each command is at the start, at the places of START, shape (5, n_c)."""
     motors: Kept
     """Coordinate of each motor or filter that follows a command, and the command's number, shape (k, 2)."""
     rows: Kept
@@ -73,16 +76,20 @@ class DriveTables(NamedTuple):
 
 
 class PatientTables(NamedTuple):
-    """The patient in the device; m muscles, k control times."""
+    """The patient in the device, who acts at ticks of its own clock (patient/effort.py); m muscles, k ticks."""
 
     traits: Cleared
     """Numbers of the patient, at the places of PATIENT."""
     effort: EffortState
     """Effort, fatigue and the memories of delayed signals."""
+    ticks: Cleared
+    """Number of times that the patient has acted, shape (1,)."""
     wanted: Cleared
-    """Motor command at each control time, shape (k, m)."""
+    """Motor command at each tick, shape (k, m)."""
+    course: Cleared
+    """psi, its rate and its acceleration at each tick, shape (k, 3)."""
     excitations: Cleared
-    """Excitation of each muscle at the end of the last period [-], shape (m,)."""
+    """Excitation of each muscle at the next tick [-], shape (m,)."""
     felt: Cleared
     """What the patient feels of the elbow, at the places of FELT."""
     senses: Kept
@@ -155,7 +162,7 @@ class ObserverTables(NamedTuple):
     streams: Kept
     """Random stream of each component's noise, as a signed number, shape (n,)."""
     tremor: Cleared
-    """Standard normal numbers for the tremor, shape (k,)."""
+    """Standard normal numbers for the tremor, one for each tick of the patient."""
     noise: Cleared
     """Standard normal numbers for each component, shape (k, n)."""
     memory: Cleared
@@ -244,6 +251,8 @@ class RestTables(NamedTuple):
     """Coordinate of each muscle's fibre length, its activation behind it, shape (m,)."""
     offset: Kept
     """Coordinate that the controller adds to psi, shape (1,), or (0,) where it adds none."""
+    zeros: Kept
+    """Coordinate of the zero of each spring that follows the hinge's angle (impedance controllers)."""
     rope: Kept
     """Place of the gym rope's length among the numbers of constraints, shape (1,)."""
     v: Filled

@@ -32,11 +32,9 @@ from dms_core.kernels import DONE, MATRIX_SINGULAR, Packed
 from dms_core.results import Result
 from dms_core.simulation.dynamics import RESULT_OF
 from dms_core.validation import plain
-from exo_env.drives.assist_moment import AssistMoment
 from exo_env.drives.checked import check_drive
 from exo_env.drives.drive import Drive, checked_action
-from exo_env.drives.pid_setpoint import PidSetpoint
-from exo_env.drives.rope_tension import RopeTension
+from exo_env.drives.modes import DRIVES
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.subject import read_subject
 from exo_env.envs.copies import Copied
@@ -58,7 +56,7 @@ from exo_env.tasks.channels import Parts, Slice
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import NOTHING, Task
-from exo_env.world.control_period import finish, run_period
+from exo_env.world.control_period import finish, move, next_stop, run_period
 from exo_env.world.episode import Episode
 from exo_env.world.held_episode import take_up
 from exo_env.world.readout import Readout
@@ -77,9 +75,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
     task_type: ClassVar[type[Task]]
-    drives: ClassVar[Mapping[str, type[Drive]]] = {
-        "rope_tension": RopeTension, "pid_setpoint": PidSetpoint, "assist_moment": AssistMoment,
-    }  # fmt: skip
+    drives: ClassVar[Mapping[str, type[Drive]]] = DRIVES
     settings_type: ClassVar[type[EnvSettings]] = EnvSettings
     ecosystem_type: ClassVar[type[Ecosystem]] = Ecosystem
     duration: float = 6.0
@@ -112,14 +108,9 @@ class AssistanceEnv(Copied, gymnasium.Env):
         self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
         self._weights = self.task.weights.model_dump()
         self._draws = EpisodeDraws(
-            self.population,
-            self.load,
-            self.movement,
-            self.made_movement,
-            self.duration,
-            self.task.start_range(),
-            self.task.draws(),
-        )
+            self.population, self.load, self.movement, self.made_movement, self.duration,
+            self.ecosystem.arm().within_stops(*self.task.start_range()), self.task.draws(),
+        )  # fmt: skip
         self._sources = self._draws.sources
         self._keys = Keys(s.cycle)
         self._readout: Readout | None = None
@@ -340,13 +331,14 @@ class AssistanceEnv(Copied, gymnasium.Env):
         """Go on where compiled code gave up: a singular matrix may need another order of elimination."""
         dynamics, status = self.world.dynamics, self.world.tables.status
         dynamics.result = RESULT_OF[int(status[STATUS.code])]
-        if status[STATUS.code] == MATRIX_SINGULAR:
-            dynamics.advance(float(self.world.times[status[STATUS.step] + 1]))
-        if dynamics.result is Result.INTERRUPTED:
-            raise KeyboardInterrupt
-        if dynamics.result is Result.SUCCESS:
-            status[STATUS.code] = DONE
+        while status[STATUS.code] == MATRIX_SINGULAR:
+            dynamics.advance(next_stop(self.world.packed.table))
+            if dynamics.result is Result.INTERRUPTED:
+                raise KeyboardInterrupt
+            if dynamics.result is not Result.SUCCESS:
+                break
             self.world.follow_dynamics()
+            dynamics.result = RESULT_OF[move(self.world.packed.table)]
         finish(self.world.packed.table)
 
     def happened(self) -> str | None:

@@ -147,8 +147,9 @@ class EpisodeDraws:
         starts = sources.movement.spread(START).limits()
         if sources.start_deg is None and not all(within(x, low, high) for x in starts):
             raise InputError(
-                f"The movement may start from {min(starts):g} to {max(starts):g} deg, and the limits let an episode "
-                f"begin from {low:g} to {high:g} deg only; give wider limits, or a reference with other {START}."
+                f"The movement may start from {min(starts):g} to {max(starts):g} deg, but limits and the elbow's stops "
+                f"let an episode begin from {low:g} to {high:g} deg; give wider limits, or a reference with other "
+                f"{START}."
             )
         return sources
 

@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from dms_core.errors import InputError
-from exo_env.drives.assist_moment import AssistMoment
 from exo_env.drives.drive import Drive
-from exo_env.drives.rope_tension import RopeTension
+from exo_env.drives.modes import WITHOUT_REFERENCE
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.settings import EnvSettings, check_whole
 from exo_env.envs.vector_env import AssistanceVectorEnv
@@ -110,7 +109,7 @@ class HiddenIntentEnv(AssistanceEnv):
 
     task_type: ClassVar[type[Task]] = HiddenIntentTask
     settings_type: ClassVar[type[EnvSettings]] = HiddenIntentSettings
-    drives: ClassVar[Mapping[str, type[Drive]]] = {"assist_moment": AssistMoment, "rope_tension": RopeTension}
+    drives: ClassVar[Mapping[str, type[Drive]]] = WITHOUT_REFERENCE
     settings: HiddenIntentSettings
 
     def usual_duration(self, settings: EnvSettings) -> float:

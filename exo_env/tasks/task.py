@@ -122,8 +122,8 @@ class Task(ABC):
         """
 
     def start_range(self) -> tuple[float, float]:
-        """Elbow angles at which an episode may begin [deg]."""
-        return 0.0, 142.0
+        """Elbow angles at which an episode may begin [deg], as far as the stops of the arm let it."""
+        return -180.0, 180.0
 
     def draws(self) -> Mapping[str, Distribution]:
         """Distributions of numbers that the task itself draws for an episode, by name.

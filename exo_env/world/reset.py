@@ -34,7 +34,8 @@ from exo_env.drives.drive import start_apart
 from exo_env.ecosystem.exoskeleton import link_moment, rope_lever
 from exo_env.ecosystem.gym_machine import clearances
 from exo_env.patient.ability import put_lacking
-from exo_env.patient.effort import reset_effort, start_excitation
+from exo_env.patient.effort import TICK, largest_activation, reset_effort, start_excitation
+from exo_env.patient.forward_model import put_limb
 from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
 from exo_env.patient.static_optimisation import (
@@ -58,6 +59,7 @@ from exo_env.tables import (
     PLAN,
     REST,
     SCALING,
+    START,
     SUBJECT,
     TASK,
     WORLD,
@@ -69,6 +71,8 @@ from exo_env.world.load_step import CONSTRAINTS
 from exo_env.world.rest_pose import MOVING, hinge_angle, hinge_transmission, put_rest
 from exo_env.world.scaling import put_numbers
 
+LEAST_CARRIED = 0.1
+"""Moment [Nm] below which a unit of a command is no measure for what holds the arm: some 2 deg from a straight arm."""
 STILL, BESIDE = 1e-9, 2
 """Rate of psi below which it rests [rad/s]; samples planned on either side of a movement."""
 FIRST_STEP = 0.5
@@ -155,7 +159,7 @@ def put_course(w):
 
 @compiled
 def put_command(w, arm, load, expected):
-    """Fill the motor command at each control time; gives the estimated error in an activation.
+    """Fill the motor command and psi at each tick of the patient; gives the estimated error in an activation.
 
     A long rest is planned once.
 
@@ -185,9 +189,32 @@ def put_command(w, arm, load, expected):
     moment, activations = np.empty(count), np.empty((count, arm.sign.shape[0]))
     needed_moments(arm, load, weights[:count], course[:count], moment)
     _, left = planned(arm, times[1], course[:count], moment, SWEEPS, RELAXATION_APART, SETTLED, activations)
-    wanted = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted)
-    interpolated(activations, row, times[1], floats(w, WORLD.period)[0], wanted)
+    put_ticks(w, activations, row, times[1])
     return left
+
+
+@compiled
+def put_ticks(w, activations, row, interval):
+    """Fill what the patient wants at each tick, from a table of activations at an interval [s], and psi there."""
+    patient, plan = inner(w, WORLD.patient), inner(w, WORLD.plan)
+    wanted, course = matrix(patient, PATIENT_TABLES.wanted), matrix(patient, PATIENT_TABLES.course)
+    interpolated(activations, row, interval, TICK, wanted)
+    times = np.empty(course.shape[0])
+    for k in range(times.shape[0]):
+        times[k] = k * TICK
+    course_of(floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients), times, course)
+
+
+@compiled
+def mean_command(w, traits):
+    """Mean activation of each muscle that a patient can give to the command [-], shape (m,)."""
+    wanted, sign = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted), floats(inner(w, WORLD.subject), SUBJECT.sign)
+    mean = np.zeros(sign.shape[0])
+    for i in range(sign.shape[0]):
+        most = largest_activation(traits, sign[i])
+        for k in range(wanted.shape[0]):
+            mean[i] += min(wanted[k, i], most) / wanted.shape[0]
+    return mean
 
 
 @compiled
@@ -208,7 +235,10 @@ def put_patient(w, arm, load, activations):
     )  # fmt: skip
     floats(w, WORLD.outcome)[OUTCOME.ability], floats(plan, PLAN.scale)[0] = ability, scale
     effort, wanted = effort_of(w), matrix(patient, PATIENT_TABLES.wanted)[0]
-    reset_effort(traits, effort, floats(w, WORLD.period)[0], wanted, floats(draw, DRAW.given)[GIVEN.phase])
+    given, constants = floats(draw, DRAW.given), floats(inner(w, WORLD.scaling), SCALING.constants)
+    expected = load_of(w, traits[PATIENT.expected_load] * given[GIVEN.load])
+    put_limb(traits, arm, expected, constants, mean_command(w, traits), effort.limb, effort.levers)
+    reset_effort(traits, effort, TICK, wanted, given[GIVEN.start], given[GIVEN.phase])
     for k in range(activations.shape[0]):
         activations[k] = start_excitation(effort, k)
 
@@ -221,17 +251,38 @@ def put_inputs(w, arm, load, activations):
     needed = needed_moment(arm, load, angle, 0.0, 0.0)
     hinge, transmission = hinge_angle(w, arm, angle), hinge_transmission(w, arm, angle)
     needed += transmission * link_moment(floats(subject, SUBJECT.link), hinge, math.sqrt(dot(g, g)))
-    lever = transmission * rope_lever(ends[0], ends[1], hinge)
-    tension = (needed - muscle_moment(arm, angle, activations)) / lever
+    lever = rope_lever(ends[0], ends[1], hinge)
+    tension = (needed - muscle_moment(arm, angle, activations)) / (transmission * lever)
     signals = inner(inner(inner(w, WORLD.dynamics), DYNAMICS.state), STATE.signals)
     commands, start, rows = floats(drive, DRIVE.commands), matrix(drive, DRIVE.start), ints(drive, DRIVE.rows)
     apart = start_apart(w)
     for i in range(commands.shape[0]):
-        commands[i] = start[0, i] + min(max(tension, 0.0), start[1, i]) + start[2, i] * apart
+        unit = tension_of(start, i, hinge, lever)
+        held = max(tension, 0.0) / unit if unit > 0.0 else 0.0
+        commands[i] = start[START.always, i] + min(held, start[START.holds, i]) + start[START.apart, i] * apart
         hold(signals, rows[i], commands[i])
     rows = ints(inner(w, WORLD.patient), PATIENT_TABLES.rows)
     for i in range(rows.shape[0]):
         hold(signals, rows[i], activations[i])
+
+
+@compiled
+def tension_of(start, i, hinge, lever):
+    """Tension of the lifting rope that a unit of command i stands for [N]: 1 where the command is a tension itself.
+
+    Near a straight arm, where a unit carries less than LEAST_CARRIED, it is 0: the command then holds nothing.
+
+    Args:
+        start: the table of the commands' start.
+        i: number of the command.
+        hinge: angle of the hinge [rad].
+        lever: moment arm of the rope there [m].
+    """
+    by_cos, by_sin = start[START.carried_cos, i], start[START.carried_sin, i]
+    if by_cos == 0.0 and by_sin == 0.0:
+        return 1.0
+    moment = by_cos * math.cos(hinge) + by_sin * math.sin(hinge)
+    return moment / lever if moment > LEAST_CARRIED else 0.0
 
 
 @compiled
@@ -246,13 +297,16 @@ def hold(signals, row, value):
 def put_world(w, arm, load, activations):
     """Put the world at rest at its start, without accelerations."""
     scaling, rest, drive = inner(w, WORLD.scaling), inner(w, WORLD.rest), inner(w, WORLD.drive)
+    subject = inner(w, WORLD.subject)
     q, v, psi = floats(scaling, SCALING.start), floats(rest, REST.v), matrix(inner(w, WORLD.plan), PLAN.course)[0, 0]
     angle = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start]
     rope = put_rest(w, arm, load, angle, psi, activations, q, v)
     floats(inner(scaling, SCALING.targets), CONSTRAINTS)[ints(rest, REST.rope)[0]] = rope
     motors, commands = inner(drive, DRIVE.motors), floats(drive, DRIVE.commands)
+    start, ends, hinge = matrix(drive, DRIVE.start), matrix(subject, SUBJECT.rope), hinge_angle(w, arm, angle)
+    lever = rope_lever(ends[0], ends[1], hinge)
     for k in range(motors.shape[0]):
-        q[motors[k, 0]] = commands[motors[k, 1]]
+        q[motors[k, 0]] = commands[motors[k, 1]] * tension_of(start, motors[k, 1], hinge, lever)
     # The controller's error counts what it adds to psi.
     offset, pid = ints(rest, REST.offset), ints(rest, REST.places)[MOVING.pid]
     for k in range(offset.shape[0]):

@@ -13,7 +13,7 @@ import numpy as np
 from dms_core import Model, SolverOptions, World
 from dms_core.errors import InputError, SimulationError
 from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
-from dms_core.model import MinimumJerk, Pid, RopeActuator
+from dms_core.model import ImpedanceController, MinimumJerk, Pid, RopeActuator
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
 from exo_env.drives.checked import check_motors
@@ -22,9 +22,9 @@ from exo_env.ecosystem.arm import excitation_name
 from exo_env.ecosystem.ecosystem import REFERENCE, Ecosystem
 from exo_env.ecosystem.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
 from exo_env.ecosystem.person import SEXES
-from exo_env.ecosystem.worn_exoskeleton import LOWER, PID
+from exo_env.ecosystem.worn_exoskeleton import HINGE, LOWER, PID
 from exo_env.patient.ability import Need
-from exo_env.patient.effort import new_effort
+from exo_env.patient.effort import TICK, new_effort
 from exo_env.patient.motor_command import arm_table, load_table, unsettled
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.streams import stream
@@ -103,6 +103,8 @@ class PatientWorld:
         self.period, self.duration = period, duration
         self.times = np.arange(steps + 1) * period
         """Control times [s], shape (k,)."""
+        # The patient's last tick may be the end's, and it looks a tick ahead.
+        self._ticks = math.ceil(steps * period / TICK) + 2
         self._arm, self._worn = ecosystem.arm(), ecosystem.worn()
         self._scaling = scaling_of(ecosystem, drive)
         held = drive.start(ecosystem.device, 0.0)
@@ -164,8 +166,9 @@ class PatientWorld:
         muscles = self._arm.muscles
         senses = [self.names[f"elbow_angle.{name}"] for name in FELT._fields]
         return PatientTables(
-            traits=np.zeros(len(FIELDS)), effort=new_effort(self._arm.signs, self.period),
-            wanted=np.zeros((len(self.times), len(muscles))), excitations=np.zeros(len(muscles)),
+            traits=np.zeros(len(FIELDS)), effort=new_effort(self._arm.signs), ticks=np.zeros(1, np.int64),
+            wanted=np.zeros((self._ticks, len(muscles))), course=np.zeros((self._ticks, 3)),
+            excitations=np.zeros(len(muscles)),
             felt=np.zeros(len(FELT)), senses=np.array(senses, np.int64),
             rows=np.array([self._row(excitation_name(m)) for m in muscles], np.int64),
         )  # fmt: skip
@@ -198,7 +201,7 @@ class PatientWorld:
         o, k = self.observer, len(self.times)
         return ObserverTables(
             columns=o.columns, imperfections=o.imperfections,
-            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(k),
+            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(self._ticks),
             noise=np.zeros((k, o.size)), memory=o.memory(), observation=np.zeros(o.size),
         )  # fmt: skip
 
@@ -233,12 +236,14 @@ class PatientWorld:
         at, calls = self.model.layout.offset, self.model.tables.values.constraints
         joints = [c.element.name for c in self.model.layout.constraints]
         added = [f.offset for f in self.model.system.forces if isinstance(f, Pid) and f.name == PID and f.offset]
+        springs = [f for f in self.model.system.forces if isinstance(f, ImpedanceController) and f.joint == HINGE]
         return RestTables(
             orientation=self._worn.orientation, misaligned=np.array([int(not self._worn.aligned)]),
             shift=np.ascontiguousarray(self._worn.shift), guided=np.ascontiguousarray(self._worn.guided_point),
             link_centre=np.array(self.ecosystem.device.lower_link.centre_of_mass),
             places=np.array([at[name] for name in NAMES_AT_REST]), fibres=np.array([at[m] for m in self._arm.muscles]),
             offset=np.array([self.model.layout.index[name] for name in added], np.int64),
+            zeros=np.array([self.model.layout.index[f"{f.name}.zero"] for f in springs], np.int64),
             rope=calls.par_ptr[[joints.index(ROPE)]], v=np.zeros(self.model.n_q),
         )  # fmt: skip
 
