@@ -163,7 +163,7 @@ FIGURES = (
         (
             Panel("moment of the muscles", "Nm", _sensor("muscle_moment")),
             Panel("moment of the exoskeleton", "Nm", _sensor("exo_moment")),
-            Panel("moment of both", "Nm", _both_moments),
+            Panel("moment of both together", "Nm", _both_moments),
         ),
     ),
     Figure(

@@ -15,6 +15,8 @@ from exo_env.rendering.quantities import quantity
 
 NEAR = 0.02
 """Distance within which curves cannot be told apart, as a share of what the panel spans [-]: two lines' width."""
+SMALLEST = 0.01
+"""Distances below are not told to the digit [unit of the quantity]."""
 OFTEN = 0.1
 """Share of the time for which curves must be farther apart than that, to count as two [-]."""
 
@@ -92,5 +94,7 @@ def told(twins: Sequence[Twin], unit: str) -> str:
     for on, ones in groups.items():
         *first, last = [one.curve.name for one in ones]
         names = f"{', '.join(first)} and {last}" if first else last
-        said.append(f"{names} on {on} (at most {quantity(max(one.apart for one in ones), unit, 2)} apart)")
+        apart = max(one.apart for one in ones)
+        size = f"at most {quantity(apart, unit, 2)}" if apart >= SMALLEST else f"less than {quantity(SMALLEST, unit)}"
+        said.append(f"{names} on {on} ({size} apart)")
     return "; ".join(said)
