@@ -6,6 +6,7 @@ Compiled code takes views of their fields by name and calls, without touching a 
     advance(m, s, o, t_end, record, 0)    steps to t_end; gives (a code of OUTCOME, rows recorded)
     restart(m, s, o)                      accelerations and multipliers behind a jump; False if there are none
     rewind(s, q, v, step)                 back to t = 0 at other coordinates and rates
+    renumber(s)                           says that numbers of the model have changed
     read_sensors(sensing, signals, t, q, v, vd, lam, behind, y)     all sensors of one state
     constraint_gap(m, s)                  largest |phi| of the present state
 
@@ -36,7 +37,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.compiled.side_by_side import register as compile_beside_models
 from dms_core.simulation.newton import largest_errors
 from dms_core.simulation.parts import PARTS, advance, restart, run_part
-from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, rewind
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, renumber, rewind
 from dms_core.simulation.step_control import OUTCOME
 
 T = CLOCK.t
@@ -73,6 +74,7 @@ __all__ = [
     "naturals",
     "number",
     "read_sensors",
+    "renumber",
     "restart",
     "rewind",
     "table_at",

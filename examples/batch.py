@@ -7,7 +7,7 @@ import numpy as np
 
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 
-worlds = gymnasium.make_vec("exo_env:exo/ElbowLift-v1", num_envs=32, patient="mixed")
+worlds = gymnasium.make_vec("exo_env:exo/ElbowLift-v2", num_envs=32, patient="mixed")
 alone = ElbowLiftEnv(patient="mixed")
 seen, _ = worlds.reset(seed=0)
 same, _ = alone.reset(seed=7)

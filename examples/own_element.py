@@ -54,7 +54,7 @@ class InWaterEnv(ElbowLiftEnv):
 
 
 for env_type in (ElbowLiftEnv, InWaterEnv):
-    env = env_type(patient={"maximum_activation_flexors": 0.0}, load=1.0, limits={"lowest_deg": -10.0})
+    env = env_type(patient={"maximum_activation_flexors": 0.0}, load=1.0)
     env.reset(seed=0)
     for _ in range(15):
         env.step(np.array([-1.0, -1.0]))  # both ropes slack: the arm falls

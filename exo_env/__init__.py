@@ -21,9 +21,14 @@ moved_modules("exo_env", MOVED, NAMES)
 
 # Gymnasium's passive checker takes a first reset that raised for done, and breaks at the next step; the environment
 # checks its arguments itself.
-register(
-    id="exo/ElbowLift-v1",
-    entry_point="exo_env.envs.elbow_lift:ElbowLiftEnv",
-    vector_entry_point="exo_env.envs.elbow_lift:ElbowLiftVectorEnv",
-    disable_env_checker=True,
-)
+for name, place in (
+    ("ElbowLift-v2", "elbow_lift:ElbowLift"),
+    ("HiddenIntent-v0", "hidden_intent:HiddenIntent"),
+    ("NewPatient-v0", "hidden_intent:NewPatient"),
+):
+    register(
+        id=f"exo/{name}",
+        entry_point=f"exo_env.envs.{place}Env",
+        vector_entry_point=f"exo_env.envs.{place}VectorEnv",
+        disable_env_checker=True,
+    )

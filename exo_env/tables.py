@@ -20,6 +20,10 @@ STATUS = places(("step", "code", "event"))
 """Places in `WorldTables.status`: control periods done, code of the solver, event that ended the episode."""
 GIVEN = places(("load", "start", "phase"))
 """Places in `DrawTables.given`: weight on the machine [kg], elbow angle and phase of the tremor at the start [rad]."""
+START = places(("always", "holds", "apart", "carried_cos", "carried_sin"))
+"""Places in a column of `DriveTables.start`: the value of a command, the most that it takes of what holds the arm, what
+it has for each radian by which the arm begins beyond psi, and the moment that a unit of it gives, as m_c and m_s [Nm],
+zeros where it is a tension of its own [N]."""
 FELT = places(("angle", "rate"))
 """Places in `PatientTables.felt`: angle [rad] and rate [rad/s] of the elbow."""
 OUTCOME = places(("ability", "left", "gap"))
@@ -52,12 +56,13 @@ class DriveTables(NamedTuple):
     steps: Kept
     """Largest change of each command in a control period, shape (n_c,)."""
     start: Kept
-    """What each command is at the start, the most that it takes of the holding tension, and what it has for each radian
-    by which the arm begins beyond psi, shape (3, n_c)."""
+    """What each command is at the start, at the places of START, shape (5, n_c)."""
     motors: Kept
     """Coordinate of each motor or filter that follows a command, and the command's number, shape (k, 2)."""
     rows: Kept
     """Row of each command in the signals of the world, shape (n_c,)."""
+    hinge: Kept
+    """Place in y of the angle that the device measures at its hinge, shape (1,)."""
     axes: Kept
     """Axes of both links where the hinge is at 0, as columns in ground axes, shape (3, 3)."""
     action: Cleared
@@ -110,6 +115,10 @@ class PlanTables(NamedTuple):
     """How far ahead the reference is shown [s]."""
     preview: Cleared
     """psi that far ahead at each control time, shape (k, n)."""
+    loads: Filled
+    """Weight on the machine at each control time [kg], shape (k,)."""
+    needed: Filled
+    """Moment that arm and load need along psi at each control time [Nm], shape (k,)."""
     lacking: Cleared
     """What the patient cannot give of the needed moment at each control time [Nm], shape (k,)."""
     scale: Cleared
@@ -171,6 +180,8 @@ class DrawTables(NamedTuple):
     """Row of the patient."""
     movement: Filled
     """Numbers of the movement."""
+    task: Filled
+    """Numbers that the task draws, in the order of `Task.draws`."""
     given: Filled
     """Load, angle and phase of the start, at the places of GIVEN."""
 
@@ -240,6 +251,8 @@ class RestTables(NamedTuple):
     """Coordinate of each muscle's fibre length, its activation behind it, shape (m,)."""
     offset: Kept
     """Coordinate that the controller adds to psi, shape (1,), or (0,) where it adds none."""
+    zeros: Kept
+    """Coordinate of the zero of each spring that follows the hinge's angle (impedance controllers)."""
     rope: Kept
     """Place of the gym rope's length among the numbers of constraints, shape (1,)."""
     v: Filled

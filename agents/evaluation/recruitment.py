@@ -51,7 +51,7 @@ def powers(episode: Episode, n: int) -> tuple[np.ndarray, np.ndarray]:
     assert machine is not None
     known = InternalModel.of(episode.arm, machine, patient.expected_load * episode.load)
     course, planned = episode.course[:n], np.empty(n)
-    needed_moments(known.arm, known.load, course, planned)
+    needed_moments(known.arm, known.load, np.full(n, known.load.weight), course, planned)
     flexed = np.where(episode.arm.signs > 0.0, 1.0, MINIMUM)
     rate, full = course[:, 1], np.array([known.muscle_moment(psi, flexed) for psi in course[:, 0]])
     return np.maximum(planned * rate, 0.0), np.maximum(full * rate, 0.0)

@@ -91,7 +91,7 @@ class Model:
         if known:
             self._tables = Packed(self._with_orders_of(known))
         else:
-            self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0))
+            self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0, self._signals))
 
     def _rows_of(self, constraint: int) -> range:
         """Rows of a constraint by its number."""
@@ -142,8 +142,8 @@ class Model:
         """Constant tables (a packed Tables) for the compiled solver."""
         return self._tables
 
-    def reordered(self, q: np.ndarray, v: np.ndarray, t: float) -> Packed:
-        """Tables with independent rows and elimination orders chosen anew at q, v, shape (n_q,).
+    def reordered(self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals) -> Packed:
+        """Tables with independent rows and elimination orders chosen anew at q, v, shape (n_q,), and those inputs.
 
         Raises:
             ModelError: the equations are singular there.
@@ -153,15 +153,15 @@ class Model:
         rows = np.concatenate([np.arange(c.row, c.row + c.rows) for c in moving] + [np.zeros(0, int)]).astype(int)
         G = self.constraint_jacobian(q, v, t)[2][np.ix_(rows, self.welds.free)]
         found, solved = rows[independent_rows(G).independent], self.welds.solved
-        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t))
+        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals))
 
-    def _order(self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) -> Tables:
-        """Tables with scatter and elimination orders of both linear systems chosen at q, v."""
+    def _order(self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals) -> Tables:
+        """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t."""
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
-        systems = ordered_systems(Sampling(layout, dynamics, constraints, self._signals, free, solved), q, v, t)
+        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t)
         return Tables(
             dynamics, constraints, self._sensors.values, *systems, free, solved, self.second_order,
             *nominal_sizes(layout), sum(len(c.iu) > 0 for c in layout.constraints),

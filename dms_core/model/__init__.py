@@ -19,9 +19,17 @@ from dms_core.model.constraints import (
     Slider,
     Spherical,
 )
-from dms_core.model.control import DelayedError, Pid, ReferenceFilter, RopeActuator
+from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
-from dms_core.model.forces import FirstOrder, Gravity, JointSpringDamper, LumpedLoad, SecondOrder, SpringDamper
+from dms_core.model.forces import (
+    FirstOrder,
+    Gravity,
+    JointSpringDamper,
+    JointStop,
+    LumpedLoad,
+    SecondOrder,
+    SpringDamper,
+)
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
 from dms_core.model.ropes import PathPoint, RopeForce
 from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSensor, Point, RopeSensor, Tracking
@@ -43,12 +51,14 @@ __all__ = [
     "Function",
     "Gravity",
     "Harmonic",
+    "ImpedanceController",
     "Imu",
     "Input",
     "JointAngle",
     "JointMoment",
     "JointReaction",
     "JointSpringDamper",
+    "JointStop",
     "LineGuide",
     "Lines",
     "LumpedLoad",

@@ -140,7 +140,7 @@ class World(Inspection):
         """Choose rows and pivots anew where the old ones became singular; False if nothing helps."""
         s = self.state
         try:
-            self._tables = self.model.reordered(s.q, s.v, self.time)
+            self._tables = self.model.reordered(s.q, s.v, self.time, s.signals)
         except ModelError as error:
             self._singular = str(error)
             return False

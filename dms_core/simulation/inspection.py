@@ -109,7 +109,8 @@ class Inspection:
             return NewtonMatrix(self._tables, work, c0)
         except SimulationError:
             try:
-                return NewtonMatrix(self.model.reordered(at.q, at.v, self.time), work, c0)
+                tables = self.model.reordered(at.q, at.v, self.time, self.state.signals)
+                return NewtonMatrix(tables, work, c0)
             except ModelError as error:
                 raise SimulationError(f"the Newton matrix is singular at this state: {error}") from error
 

@@ -189,6 +189,13 @@ def rewind(s, q, v, step):
         v_s[i] = qd[i] = v_before[i] = v_w[i] = v[i]
 
 
+@compiled
+def renumber(s):
+    """Say that numbers of the model have changed, such as a mass: the next step begins with their rates and factors."""
+    counts = ints(s, STATE.counts)
+    counts[COUNTS.restart], counts[COUNTS.stale], counts[COUNTS.rates_factored] = 1, 1, 0
+
+
 def with_tables(tables: Tables, state: State) -> Packed:
     """The same world for other rows and elimination orders: it starts afresh, with multipliers 0 as their guess."""
     state.counts[COUNTS.restart] = state.counts[COUNTS.stale] = 1

@@ -15,7 +15,7 @@ from exo_env.envs.soak import soak as long_run
 
 def soak(
     steps: int = 100_000,
-    env: Annotated[str, arg(metavar="ID")] = "exo/ElbowLift-v1",
+    env: Annotated[str, arg(metavar="ID")] = "exo/ElbowLift-v2",
     population: str = "evaluation",
     exoskeleton: Annotated[str, arg(metavar="NAME|FILE.yaml")] = DEFAULT,
     seed: int = 0,

@@ -48,6 +48,8 @@ def _check_command(who: str, command: Command) -> None:
         raise InputError(f"{who}: start = {command.start}; expected a finite number.")
     if not math.isfinite(command.apart):
         raise InputError(f"{who}: apart = {command.apart}; expected a finite number.")
+    if not all(map(math.isfinite, command.carries or ())):
+        raise InputError(f"{who}: carries = {command.carries}; expected two finite moments [Nm], or None.")
     if not command.holds >= 0.0:
         raise InputError(f"{who}: holds = {command.holds}; expected a tension from 0 N.")
 

@@ -4,8 +4,9 @@ A drive is the part of the model behind the ropes, and how actions become its in
 declares its action's components, its commands (inputs of the model, each with a largest rate) and its forces, and a
 compiled kernel that says what each command is to be at the end of the coming control period:
 
-    kernel(w)      reads floats(drive, DRIVE.action), floats(drive, DRIVE.numbers) and, if it likes, the readings of
-                   the task; writes floats(drive, DRIVE.wanted); drive = inner(w, WORLD.drive)
+    kernel(w)      reads floats(drive, DRIVE.action), floats(drive, DRIVE.numbers) and, if it likes, the hinge's angle,
+                   `measured_hinge(w)`, which every world has, or readings of the task, which another task may lack;
+                   writes floats(drive, DRIVE.wanted); drive = inner(w, WORLD.drive)
 
 A command goes linearly from its last value to the new one over the period, as far as its largest rate takes it, so that
 rates hold at all times and nothing jumps inside the solver.
@@ -31,7 +32,7 @@ from dms_core.validation import shown
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.worn_exoskeleton import WornExoskeleton
 from exo_env.settings import Settings
-from exo_env.tables import DRAW, DRIVE, GIVEN, PLAN, STATUS, WORLD
+from exo_env.tables import DRAW, DRIVE, DYNAMICS, GIVEN, PLAN, START, STATUS, WORLD
 
 RETURN = 2.0
 """Time in which a setpoint goes from where the arm begins to psi [s]; assumed: that of a slow move of the exercise."""
@@ -48,7 +49,9 @@ class Command:
     start: float = 0.0
     """Value at the start of an episode."""
     holds: float = 0.0
-    """Most that it takes, at the start, of the tension that holds the arm [N]."""
+    """Most that it takes, at the start, of what holds the arm: a tension of the lifting rope [N], or see `carries`."""
+    carries: tuple[float, float] | None = None
+    """m_c and m_s [Nm] of a command that is no tension, but gives m_c cos(theta) + m_s sin(theta) times its value."""
     apart: float = 0.0
     """What it has at the start beside that, for each radian by which the arm begins beyond psi."""
     motor: str | None = None
@@ -84,13 +87,19 @@ class Drive(Settings):
         return [Input(name=n, signal=Constant(value=float(x))) for n, x in zip(names, start, strict=True)]
 
     def start_table(self, device: Exoskeleton) -> np.ndarray:
-        """Start of each command, the most that it takes of the holding tension, and `apart`, shape (3, n)."""
-        return np.array([[c.start, c.holds, c.apart] for c in self.commands(device)]).T.copy()
+        """What each command has of START, shape (5, n)."""
+        return np.array(
+            [[c.start, c.holds, c.apart, *(c.carries or (0.0, 0.0))] for c in self.commands(device)]
+        ).T.copy()
 
     def start(self, device: Exoskeleton, holding_tension: float) -> np.ndarray:
-        """Each command at the start on psi, where a tension [N] of the lifting rope would hold the arm."""
-        always, most, _ = self.start_table(device)
-        return always + np.clip(holding_tension, 0.0, most)
+        """Each command at the start on psi, where a tension [N] of the lifting rope would hold the arm.
+
+        What a command that is no tension takes of it depends on the angle (world/reset.py) and is left out.
+        """
+        tensions = np.array([c.carries is None for c in self.commands(device)])
+        table = self.start_table(device)
+        return table[START.always] + tensions * np.clip(holding_tension, 0.0, table[START.holds])
 
 
 @compiled
@@ -100,6 +109,12 @@ def affine(w):
     action, wanted, x = floats(drive, DRIVE.action), floats(drive, DRIVE.wanted), matrix(drive, DRIVE.numbers)
     for i in range(wanted.shape[0]):
         wanted[i] = x[i, 0] + x[i, 1] * action[i]
+
+
+@compiled
+def measured_hinge(w):
+    """Angle of the device's hinge at the present control time [rad]."""
+    return floats(inner(w, WORLD.dynamics), DYNAMICS.y)[ints(inner(w, WORLD.drive), DRIVE.hinge)[0]]
 
 
 @compiled

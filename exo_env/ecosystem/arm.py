@@ -12,24 +12,27 @@ J. Biomech. 29:1223-1230:
     inertia  J  = J_0  (m / m_0) k^2
     muscle   L0 and Ls with the length of the whole path at 90 degrees; F0 = F0_0 strength (M / M_0) / (H / H_0),
              since muscle volume goes with body mass and force with volume over fibre length
+    stop     k  = k_0 M / M_0, since a moment of tissue is a stress times an area times a lever, which is a volume
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from math import radians
+from math import degrees, radians
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dms_core.model import GROUND, Fixed, PathPoint, Revolute, RigidBody, ThelenMuscle
+from dms_core.model import GROUND, Fixed, JointStop, PathPoint, Revolute, RigidBody, ThelenMuscle
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.geometry.frames import quaternion, rotation_matrix, unit
 from exo_env.ecosystem.person import HEIGHT_0, MASS_0, Person
-from exo_env.ecosystem.subject import BODY_ROLES, DEFAULT, Subject, read_subject
+from exo_env.ecosystem.subject import BODY_ROLES, DEFAULT, StopFacts, Subject, read_subject
 
-ELBOW = "elbow"
+ELBOW, ELBOW_STOP = "elbow", "elbow_stop"
+USUAL_RANGE_DEG = (0.0, 142.0)
+"""A straight arm, and the mean active flexion of men (Boone and Azen 1979, J. Bone Joint Surg. 61-A:756-759) [deg]."""
 MASS_FRACTION = {
     "male": {"torso": 0.4346, "humerus": 0.0271, "forearm": 0.0162 + 0.0061},
     "female": {"torso": 0.4257, "humerus": 0.0255, "forearm": 0.0138 + 0.0056},
@@ -174,9 +177,27 @@ class Arm:
             ),
         ]  # fmt: skip
 
+    @property
+    def stop(self) -> StopFacts | None:
+        """Stops of the elbow of a person of arm26's mass; None where the subject has none."""
+        facts = self.facts["joints"][self.facts["roles"]["elbow"]].get("stop")
+        return None if facts is None else StopFacts(**facts)
+
+    def within_stops(self, low: float, high: float) -> tuple[float, float]:
+        """A range of elbow angles as far as the stops leave it free [deg]; without stops, as far as those of men."""
+        lowest, highest = USUAL_RANGE_DEG
+        if self.stop is not None:
+            # Given in radians: the way to degrees leaves the last digit.
+            lowest, highest = round(degrees(self.stop.lowest), 10), round(degrees(self.stop.highest), 10)
+        return max(low, lowest), min(high, highest)
+
     def forces(self) -> list[Force]:
-        """What acts in the joints beside the muscles: elements that read traits of the person with `acts="joint"`."""
-        return []
+        """What acts in the joints beside the muscles: stops, elements that read traits with `acts="joint"`."""
+        if self.stop is None:
+            return []
+        facts = self.stop.model_dump()
+        facts["stiffness"] *= self.person.body_mass / MASS_0
+        return [JointStop(name=ELBOW_STOP, joint=ELBOW, **facts)]
 
     def path(self, muscle: str, *, welded: bool = False) -> tuple[PathPoint, ...]:
         """Points of a muscle; with `welded`, torso and humerus are parts of the ground."""

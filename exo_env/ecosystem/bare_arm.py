@@ -169,7 +169,7 @@ def table(trajectory: Trajectory, sample: float) -> dict[str, np.ndarray]:
 
 
 def warnings(trajectory: Trajectory) -> list[str]:
-    """Sentences of warning: on an elbow outside the range of arm26, which has no joint stops."""
+    """Sentences of warning: on an elbow outside the range of arm26; the bare arm has no stops, as OpenSim's."""
     degrees = np.degrees(np.unwrap(trajectory.sensors()["elbow_angle.angle"]))
     low, high = degrees.min(), degrees.max()
     if low >= 0.0 and high <= HIGHEST_FLEXION_DEG:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dms_core.model import JointAngle, JointMoment, JointReaction, MuscleSensor, RopeSensor, Tracking
+from dms_core.model import Imu, JointAngle, JointMoment, JointReaction, MuscleSensor, RopeSensor, Tracking
 from dms_core.model.element import Sensor
 from dms_core.model.sensors.muscle import Component
 from exo_env.ecosystem.arm import ELBOW
@@ -10,6 +10,12 @@ from exo_env.ecosystem.gym_machine import ROPE
 from exo_env.ecosystem.worn_exoskeleton import GUIDE, HINGE, LOWER, PID
 
 MUSCLE_COMPONENTS: tuple[Component, ...] = ("length", "fibre_length", "fibre_velocity", "activation", "tendon_force")
+
+
+FOREARM_IMU = "forearm_imu"
+"""Name of the inertial sensor on the forearm."""
+WRIST = (0.0, -0.2, 0.0)
+"""Where it is worn, in the frame of the forearm [m]; assumed: a bracelet above the wrist, 0.2 m from the elbow."""
 
 
 def muscle_sensor(muscle: str, component: Component) -> str:
@@ -42,4 +48,5 @@ def sensors(muscles: tuple[str, ...], ropes: tuple[str, ...], *, gym: bool) -> l
         JointMoment(name="exo_moment", joint=HINGE, elements=ropes, bodies=(LOWER,)),
         JointReaction(name="elbow_reaction", constraint=ELBOW, body="forearm"),
         JointReaction(name="guide_force", constraint=GUIDE, body="forearm"),
+        Imu(name=FOREARM_IMU, body="forearm", point=WRIST),
     ]

@@ -55,11 +55,27 @@ class BodyFacts(Facts):
     inertia: Vector = Field(description="principal moments about the centre of mass [kg m^2]")
 
 
+class StopFacts(Settings):
+    """Stops at both ends of a hinge's range, of an arm of the file's own size: fields of JointStop."""
+
+    lowest: float = Field(ge=-math.pi, le=math.pi, description="angle where the lower stop is touched [rad]")
+    highest: float = Field(ge=-math.pi, le=math.pi, description="angle where the upper stop is touched [rad]")
+    stiffness: float = Field(gt=0.0, description="[N m/rad^1.5]")
+    dissipation: float = Field(ge=0.0, description="[s/rad]")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.lowest >= self.highest:
+            raise ValueError(f"lowest = {self.lowest:g} must be below highest = {self.highest:g}")
+        return self
+
+
 class JointFacts(Facts):
     """A joint of the model."""
 
     point_i: Vector = Field(description="centre of the joint in the frame of its first body [m]")
     axis_i: Vector | None = Field(default=None, description="axis of a hinge in the frame of its first body [-]")
+    stop: StopFacts | None = Field(default=None, description="stops of the elbow; none where it is not given")
 
 
 class PointFacts(Facts):
@@ -108,6 +124,9 @@ class SubjectFacts(Facts):
                 _check_role(role, getattr(self.roles, role), known, section)
         for name in self.roles.flexors:
             _check_role("flexors", name, self.muscles, "muscles")
+        for name, joint in self.joints.items():
+            if joint.stop is not None and name != self.roles.elbow:
+                raise ValueError(f"joints.{name}: stop: only the elbow, '{self.roles.elbow}', turns and has stops")
         _check_elbow_axis(self.roles.elbow, self.joints[self.roles.elbow].axis_i)
         for key in TIME_CONSTANTS:
             if key not in self.muscle_defaults:

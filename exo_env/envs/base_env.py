@@ -34,8 +34,7 @@ from dms_core.simulation.dynamics import RESULT_OF
 from dms_core.validation import plain
 from exo_env.drives.checked import check_drive
 from exo_env.drives.drive import Drive, checked_action
-from exo_env.drives.pid_setpoint import PidSetpoint
-from exo_env.drives.rope_tension import RopeTension
+from exo_env.drives.modes import DRIVES
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.subject import read_subject
 from exo_env.envs.copies import Copied
@@ -76,7 +75,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
     task_type: ClassVar[type[Task]]
-    drives: ClassVar[Mapping[str, type[Drive]]] = {"rope_tension": RopeTension, "pid_setpoint": PidSetpoint}
+    drives: ClassVar[Mapping[str, type[Drive]]] = DRIVES
     settings_type: ClassVar[type[EnvSettings]] = EnvSettings
     ecosystem_type: ClassVar[type[Ecosystem]] = Ecosystem
     duration: float = 6.0
@@ -109,8 +108,9 @@ class AssistanceEnv(Copied, gymnasium.Env):
         self.observation_space = spaces.Box(*self.observer.limits, dtype=np.float32)
         self._weights = self.task.weights.model_dump()
         self._draws = EpisodeDraws(
-            self.population, self.load, self.movement, self.made_movement, self.duration, self.task.start_range()
-        )
+            self.population, self.load, self.movement, self.made_movement, self.duration,
+            self.ecosystem.arm().within_stops(*self.task.start_range()), self.task.draws(),
+        )  # fmt: skip
         self._sources = self._draws.sources
         self._keys = Keys(s.cycle)
         self._readout: Readout | None = None

@@ -91,6 +91,7 @@ class EpisodeDraws:
         movement_of: makes another movement from what a reset option gives.
         duration: length of an episode [s].
         start_range: elbow angles at which an episode may begin [deg].
+        of_task: distributions of the numbers that the task draws, by name.
 
     Raises:
         InputError: the movement may start where no episode may.
@@ -104,7 +105,9 @@ class EpisodeDraws:
         movement_of: Callable[[Any], Movement],
         duration: float,
         start_range: tuple[float, float],
+        of_task: Mapping[str, Distribution],
     ) -> None:
+        self._of_task = Draws({f"task.{name}": spread for name, spread in of_task.items()})
         self.movement_of, self.duration, self.start_range = movement_of, duration, start_range
         self.sources = self._checked(Sources(patients, Draws({LOAD: load}), movement))
 
@@ -144,8 +147,9 @@ class EpisodeDraws:
         starts = sources.movement.spread(START).limits()
         if sources.start_deg is None and not all(within(x, low, high) for x in starts):
             raise InputError(
-                f"The movement may start from {min(starts):g} to {max(starts):g} deg, and the limits let an episode "
-                f"begin from {low:g} to {high:g} deg only; give wider limits, or a reference with other {START}."
+                f"The movement may start from {min(starts):g} to {max(starts):g} deg, but limits and the elbow's stops "
+                f"let an episode begin from {low:g} to {high:g} deg; give wider limits, or a reference with other "
+                f"{START}."
             )
         return sources
 
@@ -163,4 +167,4 @@ class EpisodeDraws:
             start_deg = float(numbers[sources.movement.names.index(START)])
         phase = 2.0 * math.pi * uniform(k, PHASE, 0)
         patient, load = sources.patients.draw(k), float(sources.loads.sample(k)[0])
-        return Draw(key, patient, load, numbers, math.radians(start_deg), phase)
+        return Draw(key, patient, load, numbers, self._of_task.sample(k), math.radians(start_deg), phase)

@@ -1,4 +1,4 @@
-"""The environment exo/ElbowLift-v1."""
+"""The environment exo/ElbowLift-v2."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIME = 6.0
 
 
 class ElbowLiftSettings(EnvSettings):
-    """The arguments of exo/ElbowLift-v1."""
+    """The arguments of exo/ElbowLift-v2."""
 
     repetitions: Any = Field(default=1, description="number of repetitions in an episode")
 
@@ -37,9 +37,10 @@ class ElbowLiftEnv(AssistanceEnv):
     possible, the device no more than is needed: effort is forgotten where the device leaves no error.
 
     ## Action Space
-    `Box(-1, 1, (2,), float32)`. Numbers beyond -1 to 1 are clipped; a number that is not finite, or another shape, is
-    an error. An action says what the commands are at the end of its control period. With `action_mode="rope_tension"`
-    (the default) these are tensions, which change by at most 2000 N/s and follow with a lag of 0.02 s:
+    `Box(-1, 1, (2,), float32)`, or three numbers for "impedance". Numbers beyond -1 to 1 are clipped; a number that is
+    not finite, or another shape, is an error. An action says what the commands are at the end of its control period.
+    With `action_mode="rope_tension"` (the default) these are tensions, which change by at most 2000 N/s and follow with
+    a lag of 0.02 s:
 
     | Num | Action             | Min | Max | Control Min | Control Max | Unit |
     |-----|--------------------|-----|-----|-------------|-------------|------|
@@ -53,6 +54,25 @@ class ElbowLiftEnv(AssistanceEnv):
     |-----|--------------------|-----|-----|-------------|-------------|------|
     | 0   | setpoint change    | -1  | 1   | -0.2        | 0.2         | rad  |
     | 1   | authority          | -1  | 1   | 0           | 1           | -    |
+
+    With `action_mode="assist_moment"` it is a moment about the device's hinge and a co-tension, the mean tension of
+    both ropes beside it. The device's moment arms at the measured angle make tensions of them, which stay within those
+    above and follow in the same way:
+
+    | Num | Action             | Min | Max | Control Min | Control Max | Unit |
+    |-----|--------------------|-----|-----|-------------|-------------|------|
+    | 0   | moment             | -1  | 1   | -15         | 15          | Nm   |
+    | 1   | co-tension         | -1  | 1   | 0           | 40          | N    |
+
+    With `action_mode="impedance"` the device is compliant: a spring, whose zero follows the hinge with a time constant
+    of 0.1 s, a damper, and a share of the moment that holds an average arm and the device's link; the motors follow
+    this law with a lag of 0.02 s. Each number changes by at most 10 times its largest value in a second:
+
+    | Num | Action             | Min | Max | Control Min | Control Max | Unit      |
+    |-----|--------------------|-----|-----|-------------|-------------|-----------|
+    | 0   | stiffness          | -1  | 1   | 0           | 30          | Nm/rad    |
+    | 1   | damping            | -1  | 1   | 0           | 3           | N m s/rad |
+    | 2   | gravity share      | -1  | 1   | 0           | 4           | -         |
 
     ## Observation Space
     `Box`, float32, of the groups in `observation`: "device" (the default) is what a worn exoskeleton can measure, "emg"
@@ -87,8 +107,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | unsafe     | -1 where an event ends the episode                       | 100    |
 
     ## Starting State
-    At rest on the reference, muscles as the patient's command wants them; with "rope_tension" the agonist holds what
-    they do not. Each field of the patient, the load (0.5 to 2 kg), each
+    At rest on the reference, muscles as the patient's command wants them; the agonist holds what they do not, but for
+    "pid_setpoint". Each field of the patient, the load (0.5 to 2 kg), each
     number of the repetition and the noise of each channel comes from a random stream of its own, of the one number that
     a reset takes from the environment's generator. `reset(options={...})` fixes any of `patient`, `load` [kg],
     `reference` (numbers of a repetition: `start_deg` from 20 to 100, with `amplitude_deg` up to 100 in all) and
@@ -97,11 +117,12 @@ class ElbowLiftEnv(AssistanceEnv):
     `ability`, the share of arm and load that the patient can hold (`exo_env/patient/ability.py`).
 
     ## Episode End
-    Terminated, with a sentence in `info["event"]`, when the elbow leaves 0 to 142 deg, a rope exceeds 1000 N, the
+    Terminated, with a sentence in `info["event"]`, when the elbow leaves -5 to 147 deg, a rope exceeds 1000 N, the
     elbow reaction exceeds 2500 N, or the solver fails (then the observation is the last one, and
-    `info["solver_failed"]` is true). Truncated after `episode_duration` (6 s), or as long for each of
-    several repetitions, at whatever control rate; so the registration has no `max_episode_steps`, and the spec of
-    an environment says its own.
+    `info["solver_failed"]` is true). The elbow has stops at 0 and 142 deg, which yield by less than 3 deg where an arm
+    falls straight; at rest against a stop is no event, far beyond one is. Truncated after `episode_duration` (6 s), or
+    as long for each of several repetitions, at whatever control rate; so the registration has no `max_episode_steps`,
+    and the spec of an environment says its own.
 
     ## Arguments
     All by keyword, all JSON.
@@ -114,8 +135,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | `misalignment`     | `None`           | `shift` [x, y, z] m of the hinge, `tilt_deg` [about x, then y]           |
     | `subject`          | `"arm26"`        | anatomy by name or YAML file                                             |
     | `reference`        | `None`           | distributions of start_deg, amplitude_deg, rest, duration, pause         |
-    | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`                                                      |
-    | `drive_settings`   | `None`           | changes of the mode's motor or filter, see `exo_env/drives`              |
+    | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`, `"assist_moment"`, `"impedance"`                    |
+    | `drive_settings`   | `None`           | changes of the mode's settings, see `exo_env/drives`                     |
     | `observation`      | `["device"]`     | groups, or single channels as `"group.channel"`, in order                |
     | `noise`            | `True`           | `False`, or a channel's deviation, delay and quantum                     |
     | `reward_weights`   | `None`           | changes of the weights                                                   |
@@ -132,6 +153,8 @@ class ElbowLiftEnv(AssistanceEnv):
     of a misalignment are those of the links: x forward, y up along the humerus, z along the hinge.
 
     ## Version History
+    * v2: the rest before a lift is drawn, so that the time does not tell when it begins; elbows have stops, and a
+      straight arm rests; the patient acts at a rate of its own and predicts through its delays; further action modes
     * v1: every number of an episode has a random stream of its own, so that other patients are drawn; physics, rewards
       and observations are those of v0
     * v0: first version

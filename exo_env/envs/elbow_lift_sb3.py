@@ -1,4 +1,4 @@
-"""exo/ElbowLift-v1 as a VecEnv of Stable-Baselines3."""
+"""exo/ElbowLift-v2 as a VecEnv of Stable-Baselines3."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def environment_id(environment: str, say: bool = True) -> str:
     """The id under which an environment is registered now, in place of an older version of it.
 
     Args:
-        environment: an id, with or without the module that registers it: "exo/ElbowLift-v1", "module:mine/Task-v1".
+        environment: an id, with or without the module that registers it: "exo/ElbowLift-v2", "module:mine/Task-v1".
         say: tell the user where a newer version takes the place of an older one.
 
     Raises:

@@ -16,7 +16,7 @@ from exo_env.envs.lookup import spec_of
 from exo_env.tables import STATUS
 from exo_env.tasks.task import FIRST_EVENT, NOTHING, SOLVER
 
-DEFAULT = "exo/ElbowLift-v1"
+DEFAULT = "exo/ElbowLift-v2"
 
 
 def soak(

@@ -1,4 +1,4 @@
-"""Many environments of one kind in a compiled batch: gymnasium.make_vec("exo_env:exo/ElbowLift-v1", num_envs=N)."""
+"""Many environments of one kind in a compiled batch: gymnasium.make_vec("exo_env:exo/ElbowLift-v2", num_envs=N)."""
 
 from __future__ import annotations
 

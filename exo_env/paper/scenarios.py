@@ -23,12 +23,11 @@ from pydantic import Field, model_validator
 from dms_core import Model, SolverOptions, Trajectory, simulate
 from dms_core.errors import InputError
 from dms_core.model import MinimumJerk
-from exo_env.ecosystem.arm import Arm
+from exo_env.ecosystem.arm import USUAL_RANGE_DEG, Arm
 from exo_env.ecosystem.ecosystem import Ecosystem, Proprioception
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.patient.motor_command import InternalModel, MotorCommand, plan
 from exo_env.settings import Settings
-from exo_env.tasks.limits import Limits
 
 FILES = ("1_healthy", "2_passive", "3_impaired", "4_heavy")
 """Names of the paper's four scenarios, in its order."""
@@ -57,17 +56,15 @@ class Exercise(Settings):
     @model_validator(mode="after")
     def _possible(self):
         """Refuse knots that no elbow can follow."""
-        times, angles, limits = list(self.times), list(self.angles_deg), Limits()
+        times, angles, (low, high) = list(self.times), list(self.angles_deg), USUAL_RANGE_DEG
         if len(angles) != len(times):
             raise ValueError(f"angles_deg = {angles}: expected {len(times)} angles, one for each of the times")
         if times[0] < 0.0 or any(b <= a for a, b in zip(times[:-1], times[1:], strict=True)):
             raise ValueError(f"times = {times}: expected times from 0 s in rising order")
         if self.duration < times[-1]:
             raise ValueError(f"duration = {self.duration}: expected at least the last of the times, {times[-1]} s")
-        if any(not limits.lowest_deg <= a <= limits.highest_deg for a in angles):
-            raise ValueError(
-                f"angles_deg = {angles}: expected angles from {limits.lowest_deg:g} to {limits.highest_deg:g} deg"
-            )
+        if any(not low <= a <= high for a in angles):
+            raise ValueError(f"angles_deg = {angles}: expected angles from {low:g} to {high:g} deg")
         return self
 
     @property

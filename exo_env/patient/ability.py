@@ -25,7 +25,7 @@ from dms_core.model.muscles.activation import MINIMUM
 from exo_env.ecosystem.exoskeleton import link_moment
 from exo_env.patient.motor_command import InternalModel
 from exo_env.patient.patient import MIDDLE, PATIENT, Patient
-from exo_env.patient.static_optimisation import muscle_moment, needed_moment
+from exo_env.patient.static_optimisation import muscle_moment, needed_moment, needed_moments, with_weight
 
 ABLE = 0.2
 """Ability from which a patient can do something [-]."""
@@ -52,14 +52,21 @@ def able(patient, arm, load):
 
 
 @compiled
-def put_lacking(patient, arm, load, link, course, lacking):
-    """Fill M_lack [Nm] along a course; gives ability and scale as in `Need`."""
+def put_lacking(patient, arm, load, weights, link, course, needed, lacking):
+    """Fill M_need and M_lack [Nm] along a course with a weight at each time; gives ability and scale as in `Need`.
+
+    The ability is that with the weight of `load`; who carries more for a while lacks more.
+    """
     ability, total, gravity = able(patient, arm, load), 0.0, vec(load.gravity, 0)
-    g = math.sqrt(dot(gravity, gravity))
+    g, share, weight = math.sqrt(dot(gravity, gravity)), ability, load.weight
+    needed_moments(arm, load, weights, course, needed)
     for k in range(course.shape[0]):
-        needed = max(needed_moment(arm, load, course[k, 0], course[k, 1], course[k, 2]), 0.0)
-        total += needed
-        lacking[k] = (1.0 - ability) * needed + link_moment(link, course[k, 0], g)
+        if weights[k] != weight:
+            weight = weights[k]
+            share = able(patient, arm, with_weight(load, weight))
+        most = max(needed[k], 0.0)
+        total += most
+        lacking[k] = (1.0 - share) * most + link_moment(link, course[k, 0], g)
     return ability, max(total / course.shape[0], SMALLEST_SCALE)
 
 

@@ -30,7 +30,14 @@ from dms_core.model import Spline
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.gym_machine import GymMachine
-from exo_env.patient.static_optimisation import ArmTable, LoadTable, muscle_moment, needed_moment, planned
+from exo_env.patient.static_optimisation import (
+    ArmTable,
+    LoadTable,
+    muscle_moment,
+    needed_moment,
+    needed_moments,
+    planned,
+)
 
 Course = Callable[[float], tuple[float, float, float]]
 """A function from a time [s] to psi [rad], its rate [rad/s] and its acceleration [rad/s^2]."""
@@ -166,10 +173,11 @@ def plan_course(model: InternalModel, times: np.ndarray, course: np.ndarray) -> 
         SimulationError: the iteration between tendon strain and activation does not settle.
     """
     moment, activations = np.zeros(len(times)), np.zeros((len(times), len(model.muscles)))
+    along, weights = np.ascontiguousarray(course, dtype=float), np.full(len(times), model.load.weight)
+    needed_moments(model.arm, model.load, weights, along, moment)
     shortage, left = planned(
-        model.arm, model.load, float(times[1] - times[0]), np.ascontiguousarray(course, dtype=float),
-        SWEEPS, RELAXATION, SETTLED, moment, activations,
-    )  # fmt: skip
+        model.arm, float(times[1] - times[0]), along, moment, SWEEPS, RELAXATION, SETTLED, activations
+    )
     if not left < SETTLED:
         raise unsettled(left, float(times[-1]))
     return MotorCommand(times, activations, moment, shortage, model.muscles)

@@ -136,10 +136,18 @@ def needed_moment(arm, load, angle, rate, acceleration):
 
 
 @compiled
-def needed_moments(arm, load, course, moment):
-    """moment[k] of psi, its rate and its acceleration in course[k] [Nm]."""
+def needed_moments(arm, load, weights, course, moment):
+    """moment[k] of psi, its rate and its acceleration in course[k] with the weight weights[k] on the machine [Nm]."""
     for k in range(course.shape[0]):
-        moment[k] = needed_moment(arm, load, course[k, 0], course[k, 1], course[k, 2])
+        moment[k] = needed_moment(arm, with_weight(load, weights[k]), course[k, 0], course[k, 1], course[k, 2])
+
+
+@compiled
+def with_weight(load, weight):
+    """A LoadTable with another weight [kg]."""
+    return LoadTable(
+        load.inertia, load.mass, load.centre_of_mass, load.grip, load.handle, weight, load.pulley, load.gravity
+    )
 
 
 @compiled
@@ -247,27 +255,25 @@ def sweep(arm, interval, moment, lengths, levers, relaxation, tendon_force, acti
 
 
 @compiled
-def planned(arm, load, interval, course, sweeps, relaxation, settled, moment, activations):
-    """Fill moment [Nm], shape (n,), and activations [-], shape (n, m), m muscles.
+def planned(arm, interval, course, moment, sweeps, relaxation, settled, activations):
+    """Fill activations [-] that give a moment along a course, shape (n, m), m muscles.
 
     Gives the largest shortage [Nm] and the estimated error in an activation, at least `settled` where the iteration did
     not end by itself: changes fall by a rate r from one iteration to the next, and r / (1 - r) of the last is left.
 
     Args:
         arm: an ArmTable.
-        load: a LoadTable.
         interval: time between samples [s].
         course: psi, its rate and its acceleration, shape (n, 3).
+        moment: that is needed [Nm], shape (n,).
         sweeps: largest number of iterations.
         relaxation: share of a new tendon force that an iteration takes over; the first takes all.
         settled: estimated error in an activation that ends the iteration.
-        moment: filled.
         activations: filled.
     """
     n, m = activations.shape
     lengths, levers, tendon_force = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m))
     work, moments, fibre = np.zeros((2, n, m)), np.zeros((2, m)), np.zeros(n)
-    needed_moments(arm, load, course, moment)
     for k in range(n):
         c, s = math.cos(course[k, 0]), math.sin(course[k, 0])
         for i in range(m):

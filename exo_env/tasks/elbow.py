@@ -14,7 +14,7 @@ from exo_env.ecosystem.sensors import muscle_sensor, tension_sensor
 from exo_env.patient.effort import PRESENT
 from exo_env.patient.slacking import MOST_EFFORT
 from exo_env.places import places
-from exo_env.tables import DRAW, DRIVE, EFFORT, GIVEN, PATIENT_TABLES, PLAN, WORLD
+from exo_env.tables import DRIVE, EFFORT, PATIENT_TABLES, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading, trait_channels, trait_readings
 from exo_env.tasks.checked import begins
 from exo_env.tasks.task import first_of, readings, step_of
@@ -128,4 +128,4 @@ def read_elbow(w):
     for i in range(fatigued.shape[0]):
         r[at[ELBOW.fatigued] + i] = fatigued[i]
     r[at[ELBOW.effort]] = floats(state, EFFORT.present)[PRESENT.effort]
-    r[at[ELBOW.load]] = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.load]
+    r[at[ELBOW.load]] = floats(inner(w, WORLD.plan), PLAN.loads)[k]

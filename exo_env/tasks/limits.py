@@ -1,4 +1,9 @@
-"""What ends an episode early: limits of anatomy and of safety."""
+"""What ends an episode early: limits of anatomy and of safety.
+
+An elbow rests against its stops at 0 and 142 deg (configs/subject/arm26.yaml): a straight arm is no event, one that is
+pressed far beyond a stop is. At 5 deg beyond, the stop of arm26 holds 103 Nm, twice what its muscles can, and an arm
+that falls straight with 2 kg goes less than 3 deg into it, whether the ropes are slack or pull it down.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +25,14 @@ class Limits(Settings):
     """Limits beyond which an episode is over."""
 
     lowest_deg: float = Field(
-        default=0.0, ge=-10.0, le=90.0, description="elbow angle [deg]; a straight arm, where the elbow's bones meet"
+        default=-5.0, ge=-10.0, le=90.0, description="elbow angle [deg]; assumed: 5 deg beyond a straight arm"
     )
     highest_deg: float = Field(
-        default=142.0, ge=10.0, le=160.0,
-        description="elbow angle [deg]; mean active flexion of men (Boone and Azen 1979, J. Bone Joint Surg. 61:756)",
-    )  # fmt: skip
+        default=147.0,
+        ge=10.0,
+        le=160.0,
+        description="elbow angle [deg]; assumed: 5 deg beyond men's mean active flexion",
+    )
     tension: float = Field(default=1000.0, gt=0.0, description="of a rope [N]; assumed: two thirds of the motor's most")
     reaction: float = Field(
         default=2500.0, gt=0.0, description="elbow reaction force [N]; assumed: about three times body weight"

@@ -4,7 +4,8 @@ A movement is psi(t), the elbow angle that the patient wants, as polynomials in 
 fields are distributions of its numbers, and a compiled kernel that makes pieces of the numbers that were drawn:
 
     kernel(w)      reads floats(plan, PLAN.movement), writes floats(plan, PLAN.starts) and
-                   matrix(plan, PLAN.coefficients), with plan = inner(w, WORLD.plan)
+                   matrix(plan, PLAN.coefficients), with plan = inner(w, WORLD.plan); it may change
+                   floats(plan, PLAN.loads), the weight at each control time [kg], which is the drawn one so far
 
 Piece i holds from starts[i] [s] on, as sum_j coefficients[i, j] (t - starts[i])^j [rad]; the first holds before its
 start too, and the last for ever. The patient plans the motor command for psi, and errors are from psi; whether the
@@ -66,6 +67,10 @@ class Movement(Settings):
     def episode_numbers(self, duration: float) -> tuple[float, ...]:
         """Further numbers that the episode fixes, behind those that are drawn; `duration` is the episode's [s]."""
         return ()
+
+    def size(self, duration: float) -> int:
+        """Number of all numbers, those that the episode fixes included; `duration` is the episode's [s]."""
+        return len(self.names) + len(self.episode_numbers(duration))
 
     def spread(self, name: str) -> Distribution:
         """Distribution of a number.

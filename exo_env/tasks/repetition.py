@@ -136,7 +136,7 @@ class Repetitions(Movement):
     kernel: ClassVar[Any] = _put_repetitions
     start_deg: Any = {"uniform": [20.0, 35.0]}
     amplitude_deg: Any = {"uniform": [40.0, 65.0]}
-    rest: Any = 0.4
+    rest: Any = {"uniform": [0.2, 0.8]}
     duration: Any = {"uniform": [1.6, 2.2]}
     pause: Any = {"uniform": [0.3, 0.8]}
     _count: int = PrivateAttr(default=1)

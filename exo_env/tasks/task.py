@@ -34,6 +34,7 @@ import numpy as np
 from dms_core.compiled.jit import compiled
 from dms_core.errors import choices
 from dms_core.kernels import floats, inner, ints
+from exo_env.patient.distributions import Distribution
 from exo_env.settings import Settings, given_mapping
 from exo_env.tables import STATUS, TASK, WORLD
 from exo_env.tasks.channels import Channel, Parts, Reading, Slice, first_places
@@ -81,6 +82,8 @@ class Task(ABC):
     """How far ahead the patient's plan is tabulated for the kernels [s]."""
     reported: ClassVar[tuple[Reported, ...]] = ()
     """Readings that `info` of a step has, beside the reward terms."""
+    revealing: ClassVar[tuple[str, ...]] = ()
+    """Groups of observations that show what the patient wants, where a policy is not to know it."""
     read: ClassVar[Any]
     judge: ClassVar[Any]
 
@@ -119,8 +122,15 @@ class Task(ABC):
         """
 
     def start_range(self) -> tuple[float, float]:
-        """Elbow angles at which an episode may begin [deg]."""
-        return 0.0, 142.0
+        """Elbow angles at which an episode may begin [deg], as far as the stops of the arm let it."""
+        return -180.0, 180.0
+
+    def draws(self) -> Mapping[str, Distribution]:
+        """Distributions of numbers that the task itself draws for an episode, by name.
+
+        Kernels read them, in this order, as `floats(inner(w, WORLD.draw), DRAW.task)`.
+        """
+        return {}
 
     def numbers(self) -> np.ndarray:
         """Numbers that the kernels read beside the readings: here those of the limits, shape (n,)."""

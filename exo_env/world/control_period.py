@@ -40,6 +40,7 @@ from exo_env.tables import (
 )
 from exo_env.tasks.noise import imperfect
 from exo_env.tasks.task import SOLVER
+from exo_env.world.load_step import put_load
 
 SAME_TIME = 1e-6
 """Time by which two events may lie apart and still be one [s]: too short for a step of the solver."""
@@ -212,6 +213,7 @@ def run_period(w, action):
     for i in range(now.shape[0]):
         before[i] = now[i]
         now[i] = action[i]
+    put_load(w)
     set_commands(w)
     code = move(w)
     if code == DONE:

@@ -19,6 +19,8 @@ class Draw:
     """Weight on the machine [kg]."""
     movement: np.ndarray
     """Numbers of the movement, with those that the episode fixes."""
+    task: np.ndarray
+    """Numbers that the task draws, in the order of `Task.draws`."""
     start: float
     """Elbow angle at the start [rad]."""
     phase: float

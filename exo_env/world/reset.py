@@ -38,7 +38,15 @@ from exo_env.patient.effort import TICK, largest_activation, reset_effort, start
 from exo_env.patient.forward_model import put_limb
 from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
-from exo_env.patient.static_optimisation import ArmTable, LoadTable, interpolated, muscle_moment, needed_moment, planned
+from exo_env.patient.static_optimisation import (
+    ArmTable,
+    LoadTable,
+    interpolated,
+    muscle_moment,
+    needed_moment,
+    needed_moments,
+    planned,
+)
 from exo_env.streams import fill_normals
 from exo_env.tables import (
     DRAW,
@@ -51,6 +59,7 @@ from exo_env.tables import (
     PLAN,
     REST,
     SCALING,
+    START,
     SUBJECT,
     TASK,
     WORLD,
@@ -58,13 +67,18 @@ from exo_env.tables import (
 from exo_env.tasks.course import course_of
 from exo_env.tasks.noise import IMPERFECTION
 from exo_env.world.control_period import begin, effort_of, options_of
+from exo_env.world.load_step import CONSTRAINTS
 from exo_env.world.rest_pose import MOVING, hinge_angle, hinge_transmission, put_rest
 from exo_env.world.scaling import put_numbers
 
+LEAST_CARRIED = 0.1
+"""Moment [Nm] below which a unit of a command is no measure for what holds the arm: some 2 deg from a straight arm."""
 STILL, BESIDE = 1e-9, 2
 """Rate of psi below which it rests [rad/s]; samples planned on either side of a movement."""
 FIRST_STEP = 0.5
 """First step tried in an episode, over the control period: inputs leave rest along straight lines of that length."""
+SAME_TIME = 1e-6
+"""Part of a control period by which a time may lie before a control time and still be that time."""
 CLOSED = 1e-10
 """Largest |phi| of a start [m or -], as in dms_core's assembly."""
 BEGUN, PULLEY_IN_REACH, UNSETTLED, NO_RATES, GAPING = range(5)
@@ -121,11 +135,12 @@ def draw_noise(w):
 
 @compiled
 def put_course(w):
-    """Put the movement into the signal of psi, its course and its preview."""
+    """Put the movement into the signal of psi, its course and its preview, and the weight at each control time."""
     plan, period = inner(w, WORLD.plan), floats(w, WORLD.period)[0]
     movement, drawn_movement = floats(plan, PLAN.movement), floats(inner(w, WORLD.draw), DRAW.movement)
     for i in range(movement.shape[0]):
         movement[i] = drawn_movement[i]
+    floats(plan, PLAN.loads)[:] = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.load]
     call_with_table(ints(plan, PLAN.kernel)[0], w)
     t, c, course = floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients), matrix(plan, PLAN.course)
     preview, horizons, n = matrix(plan, PLAN.preview), floats(plan, PLAN.horizons), course.shape[0]
@@ -143,28 +158,37 @@ def put_course(w):
 
 
 @compiled
-def put_command(w, arm, load):
+def put_command(w, arm, load, expected):
     """Fill the motor command and psi at each tick of the patient; gives the estimated error in an activation.
 
     A long rest is planned once.
+
+    Args:
+        w: the packed world.
+        arm: an ArmTable.
+        load: a LoadTable.
+        expected: weight that the patient expects over the real one [-].
     """
     plan, times, moves = inner(w, WORLD.plan), floats(inner(w, WORLD.subject), SUBJECT.times), False
-    n = times.shape[0]
-    course, row = np.empty((n, 3)), np.zeros(n, np.int64)
+    n, loads, period = times.shape[0], floats(plan, PLAN.loads), floats(w, WORLD.period)[0]
+    course, row, weights = np.empty((n, 3)), np.zeros(n, np.int64), np.empty(n)
     course_of(floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients), times, course)
     for k in range(n):
-        if abs(course[k, 1]) > STILL:
+        weights[k] = expected * loads[min(int(times[k] / period + SAME_TIME), loads.shape[0] - 1)]
+    for k in range(n):
+        if abs(course[k, 1]) > STILL or weights[k] != weights[max(k - 1, 0)]:
             moves = True
             for i in range(max(k - BESIDE, 0), min(k + BESIDE + 1, n)):
                 row[i] = 1
     count = 0
     for k in range(n):
         if row[k] == 1 or (not moves and k < BESIDE):
-            course[count] = course[k]
+            course[count], weights[count] = course[k], weights[k]
             count += 1
         row[k] = max(count - 1, 0)
     moment, activations = np.empty(count), np.empty((count, arm.sign.shape[0]))
-    _, left = planned(arm, load, times[1], course[:count], SWEEPS, RELAXATION_APART, SETTLED, moment, activations)
+    needed_moments(arm, load, weights[:count], course[:count], moment)
+    _, left = planned(arm, times[1], course[:count], moment, SWEEPS, RELAXATION_APART, SETTLED, activations)
     put_ticks(w, activations, row, times[1])
     return left
 
@@ -205,7 +229,10 @@ def put_patient(w, arm, load, activations):
     for k in range(shown.shape[0]):
         readings[shown[k, 0]] = row[shown[k, 1]]
     link = floats(inner(w, WORLD.subject), SUBJECT.link)
-    ability, scale = put_lacking(traits, arm, load, link, matrix(plan, PLAN.course), floats(plan, PLAN.lacking))
+    ability, scale = put_lacking(
+        traits, arm, load, floats(plan, PLAN.loads), link, matrix(plan, PLAN.course), floats(plan, PLAN.needed),
+        floats(plan, PLAN.lacking),
+    )  # fmt: skip
     floats(w, WORLD.outcome)[OUTCOME.ability], floats(plan, PLAN.scale)[0] = ability, scale
     effort, wanted = effort_of(w), matrix(patient, PATIENT_TABLES.wanted)[0]
     given, constants = floats(draw, DRAW.given), floats(inner(w, WORLD.scaling), SCALING.constants)
@@ -224,17 +251,38 @@ def put_inputs(w, arm, load, activations):
     needed = needed_moment(arm, load, angle, 0.0, 0.0)
     hinge, transmission = hinge_angle(w, arm, angle), hinge_transmission(w, arm, angle)
     needed += transmission * link_moment(floats(subject, SUBJECT.link), hinge, math.sqrt(dot(g, g)))
-    lever = transmission * rope_lever(ends[0], ends[1], hinge)
-    tension = (needed - muscle_moment(arm, angle, activations)) / lever
+    lever = rope_lever(ends[0], ends[1], hinge)
+    tension = (needed - muscle_moment(arm, angle, activations)) / (transmission * lever)
     signals = inner(inner(inner(w, WORLD.dynamics), DYNAMICS.state), STATE.signals)
     commands, start, rows = floats(drive, DRIVE.commands), matrix(drive, DRIVE.start), ints(drive, DRIVE.rows)
     apart = start_apart(w)
     for i in range(commands.shape[0]):
-        commands[i] = start[0, i] + min(max(tension, 0.0), start[1, i]) + start[2, i] * apart
+        unit = tension_of(start, i, hinge, lever)
+        held = max(tension, 0.0) / unit if unit > 0.0 else 0.0
+        commands[i] = start[START.always, i] + min(held, start[START.holds, i]) + start[START.apart, i] * apart
         hold(signals, rows[i], commands[i])
     rows = ints(inner(w, WORLD.patient), PATIENT_TABLES.rows)
     for i in range(rows.shape[0]):
         hold(signals, rows[i], activations[i])
+
+
+@compiled
+def tension_of(start, i, hinge, lever):
+    """Tension of the lifting rope that a unit of command i stands for [N]: 1 where the command is a tension itself.
+
+    Near a straight arm, where a unit carries less than LEAST_CARRIED, it is 0: the command then holds nothing.
+
+    Args:
+        start: the table of the commands' start.
+        i: number of the command.
+        hinge: angle of the hinge [rad].
+        lever: moment arm of the rope there [m].
+    """
+    by_cos, by_sin = start[START.carried_cos, i], start[START.carried_sin, i]
+    if by_cos == 0.0 and by_sin == 0.0:
+        return 1.0
+    moment = by_cos * math.cos(hinge) + by_sin * math.sin(hinge)
+    return moment / lever if moment > LEAST_CARRIED else 0.0
 
 
 @compiled
@@ -249,13 +297,16 @@ def hold(signals, row, value):
 def put_world(w, arm, load, activations):
     """Put the world at rest at its start, without accelerations."""
     scaling, rest, drive = inner(w, WORLD.scaling), inner(w, WORLD.rest), inner(w, WORLD.drive)
+    subject = inner(w, WORLD.subject)
     q, v, psi = floats(scaling, SCALING.start), floats(rest, REST.v), matrix(inner(w, WORLD.plan), PLAN.course)[0, 0]
     angle = floats(inner(w, WORLD.draw), DRAW.given)[GIVEN.start]
     rope = put_rest(w, arm, load, angle, psi, activations, q, v)
-    floats(inner(scaling, SCALING.targets), 1)[ints(rest, REST.rope)[0]] = rope
+    floats(inner(scaling, SCALING.targets), CONSTRAINTS)[ints(rest, REST.rope)[0]] = rope
     motors, commands = inner(drive, DRIVE.motors), floats(drive, DRIVE.commands)
+    start, ends, hinge = matrix(drive, DRIVE.start), matrix(subject, SUBJECT.rope), hinge_angle(w, arm, angle)
+    lever = rope_lever(ends[0], ends[1], hinge)
     for k in range(motors.shape[0]):
-        q[motors[k, 0]] = commands[motors[k, 1]]
+        q[motors[k, 0]] = commands[motors[k, 1]] * tension_of(start, motors[k, 1], hinge, lever)
     # The controller's error counts what it adds to psi.
     offset, pid = ints(rest, REST.offset), ints(rest, REST.places)[MOVING.pid]
     for k in range(offset.shape[0]):
@@ -282,14 +333,14 @@ def settle(w):
 def begin_drawn(w):
     """Begin the episode whose numbers, those of the noise included, are in their places; gives what came of it."""
     draw = inner(w, WORLD.draw)
-    put_numbers(w)
+    put_numbers(w, floats(draw, DRAW.given)[GIVEN.load])
     weight = floats(draw, DRAW.given)[GIVEN.load]
     arm, load = arm_of(w), load_of(w, weight)
     activations = np.empty(arm.sign.shape[0])
     if not pulleys_out_of_reach(w, arm, load):
         return PULLEY_IN_REACH
     put_course(w)
-    left = put_command(w, arm, load_of(w, floats(draw, DRAW.patient)[PATIENT.expected_load] * weight))
+    left = put_command(w, arm, load, floats(draw, DRAW.patient)[PATIENT.expected_load])
     floats(w, WORLD.outcome)[OUTCOME.left] = left
     if not left < SETTLED:
         return UNSETTLED

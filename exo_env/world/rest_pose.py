@@ -124,6 +124,9 @@ def put_rest(w, arm, load, angle, reference, activations, q, v):
     weight = (high[0], floats(subject, SUBJECT.weight_height)[0], high[2])
     _put_body(q, at[MOVING.weight], weight, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     v[at[MOVING.pid]] = reference - hinge
+    zeros = ints(rest, REST.zeros)
+    for k in range(zeros.shape[0]):
+        q[zeros[k]] = hinge
     for i in range(activations.shape[0]):
         fibre = fibre_at_rest(arm.muscles[i], path_geometry(arm, i, angle)[0], activations[i])
         q[fibres[i]], q[fibres[i] + 1] = fibre, activations[i]

@@ -36,7 +36,7 @@ from exo_env.ecosystem.person import HEIGHT_0, JOINT_TRAITS, MASS_0, SEXES, Pers
 from exo_env.patient.motor_command import arm_table
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.places import places
-from exo_env.tables import DRAW, GIVEN, SCALING, WORLD
+from exo_env.tables import DRAW, SCALING, WORLD
 from exo_env.traits import range_of
 
 TEMPLATE_ANGLE = 1.0
@@ -149,12 +149,12 @@ def put_monomials(body_mass, height, strength, load, rise, fall, phi):
 
 
 @compiled
-def put_numbers(w):
-    """Put the numbers that follow from a patient's sizes and the load into a world."""
+def put_numbers(w, load):
+    """Put the numbers that follow from a patient's sizes and a weight on the machine [kg] into a world."""
     scaling, draw = inner(w, WORLD.scaling), inner(w, WORLD.draw)
     who, times, phi = floats(draw, DRAW.patient), floats(scaling, SCALING.constants), np.empty(len(MONOMIALS))
     put_monomials(
-        who[PATIENT.body_mass], who[PATIENT.height], who[PATIENT.strength], floats(draw, DRAW.given)[GIVEN.load],
+        who[PATIENT.body_mass], who[PATIENT.height], who[PATIENT.strength], load,
         who[PATIENT.activation_time_scale] * times[0], who[PATIENT.deactivation_time_scale] * times[1], phi,
     )  # fmt: skip
     for k in range(JOINT_PLACES.shape[0]):

@@ -13,7 +13,7 @@ import numpy as np
 from dms_core import Model, SolverOptions, World
 from dms_core.errors import InputError, SimulationError
 from dms_core.kernels import TABLE_CALL, Packed, address, compile_beside_models
-from dms_core.model import MinimumJerk, Pid, RopeActuator
+from dms_core.model import ImpedanceController, MinimumJerk, Pid, RopeActuator
 from dms_core.results import Result
 from exo_env.clearing import cleared_areas
 from exo_env.drives.checked import check_motors
@@ -22,7 +22,7 @@ from exo_env.ecosystem.arm import excitation_name
 from exo_env.ecosystem.ecosystem import REFERENCE, Ecosystem
 from exo_env.ecosystem.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
 from exo_env.ecosystem.person import SEXES
-from exo_env.ecosystem.worn_exoskeleton import LOWER, PID
+from exo_env.ecosystem.worn_exoskeleton import HINGE, LOWER, PID
 from exo_env.patient.ability import Need
 from exo_env.patient.effort import TICK, new_effort
 from exo_env.patient.motor_command import arm_table, load_table, unsettled
@@ -157,6 +157,7 @@ class PatientWorld:
             steps=np.array([c.rate for c in commands]) * self.period, start=self.drive.start_table(device),
             motors=np.array(motors, np.int64).reshape(-1, 2),
             rows=np.array([self._row(c.name) for c in commands], np.int64),
+            hinge=np.array([self.names["exo_angle.angle"]], np.int64),
             axes=np.ascontiguousarray(self._worn.frame), action=np.zeros(len(actions)), before=np.zeros(len(actions)),
             wanted=np.zeros(n), commands=np.zeros(n),
         )  # fmt: skip
@@ -175,11 +176,11 @@ class PatientWorld:
     def _plan(self) -> PlanTables:
         signals, k, n = self.dynamics.state.signals, self.model.input_index(REFERENCE), len(self.times)
         first, end = int(signals.ptr[k]), int(signals.ptr[k + 1])
-        numbers = len(self.movement.names) + len(self.movement.episode_numbers(self.duration))
         return PlanTables(
-            kernel=_address(self.movement.kernel), movement=np.zeros(numbers), starts=signals.t[first:end],
-            coefficients=signals.c[first:end], course=np.zeros((n, 3)), horizons=np.array(self.task.preview, float),
-            preview=np.zeros((n, len(self.task.preview))), lacking=np.zeros(n), scale=np.zeros(1),
+            kernel=_address(self.movement.kernel), movement=np.zeros(self.movement.size(self.duration)),
+            starts=signals.t[first:end], coefficients=signals.c[first:end], course=np.zeros((n, 3)),
+            horizons=np.array(self.task.preview, float), preview=np.zeros((n, len(self.task.preview))),
+            loads=np.zeros(n), needed=np.zeros(n), lacking=np.zeros(n), scale=np.zeros(1),
         )  # fmt: skip
 
     def _task(self) -> TaskTables:
@@ -205,8 +206,8 @@ class PatientWorld:
         )  # fmt: skip
 
     def _draw(self) -> DrawTables:
-        numbers = len(self.movement.names) + len(self.movement.episode_numbers(self.duration))
-        return DrawTables(np.zeros(1, np.int64), np.zeros(len(FIELDS)), np.zeros(numbers), np.zeros(len(GIVEN)))
+        movement, task = np.zeros(self.movement.size(self.duration)), np.zeros(len(self.task.draws()))
+        return DrawTables(np.zeros(1, np.int64), np.zeros(len(FIELDS)), movement, task, np.zeros(len(GIVEN)))
 
     def _scaled(self) -> ScalingTables:
         numbers, defaults = np.zeros(len(self._scaling.coefficients(SEXES[0]))), self._arm.facts["muscle_defaults"]
@@ -235,12 +236,14 @@ class PatientWorld:
         at, calls = self.model.layout.offset, self.model.tables.values.constraints
         joints = [c.element.name for c in self.model.layout.constraints]
         added = [f.offset for f in self.model.system.forces if isinstance(f, Pid) and f.name == PID and f.offset]
+        springs = [f for f in self.model.system.forces if isinstance(f, ImpedanceController) and f.joint == HINGE]
         return RestTables(
             orientation=self._worn.orientation, misaligned=np.array([int(not self._worn.aligned)]),
             shift=np.ascontiguousarray(self._worn.shift), guided=np.ascontiguousarray(self._worn.guided_point),
             link_centre=np.array(self.ecosystem.device.lower_link.centre_of_mass),
             places=np.array([at[name] for name in NAMES_AT_REST]), fibres=np.array([at[m] for m in self._arm.muscles]),
             offset=np.array([self.model.layout.index[name] for name in added], np.int64),
+            zeros=np.array([self.model.layout.index[f"{f.name}.zero"] for f in springs], np.int64),
             rope=calls.par_ptr[[joints.index(ROPE)]], v=np.zeros(self.model.n_q),
         )  # fmt: skip
 
@@ -251,7 +254,7 @@ class PatientWorld:
         into = self.tables.draw
         self._scaling.coefficients(SEXES[int(draw.patient[PATIENT.sex])])
         into.key[:] = np.uint64(draw.key).view(np.int64)
-        into.patient[:], into.movement[:] = draw.patient, draw.movement
+        into.patient[:], into.movement[:], into.task[:] = draw.patient, draw.movement, draw.task
         into.given[:] = draw.load, draw.start, draw.phase
 
     def begin(self) -> int:
@@ -288,8 +291,8 @@ class PatientWorld:
         plan, draw = self.tables.plan, self.tables.draw
         need = Need(float(outcome[OUTCOME.ability]), plan.lacking.copy(), float(plan.scale[0]))
         load, start, phase = draw.given.tolist()
-        drawn = Draw(int(draw.key.view(np.uint64)[0]), draw.patient.copy(), load, draw.movement.copy(), start, phase)
-        return drawn, need
+        key, numbers = int(draw.key.view(np.uint64)[0]), (draw.movement.copy(), draw.task.copy())
+        return Draw(key, draw.patient.copy(), load, *numbers, start, phase), need
 
 
 def _address(kernel: object) -> np.ndarray:

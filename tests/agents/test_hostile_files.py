@@ -120,10 +120,10 @@ def test_no_module_is_imported_because_a_file_names_it(policy, tmp_path, monkeyp
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "harm.py").write_text("raise SystemExit('harm was imported')")
     folder, facts = policy
-    written(folder, facts | {"environment": "harm:exo/ElbowLift-v1"})
+    written(folder, facts | {"environment": "harm:exo/ElbowLift-v2"})
     with pytest.raises(InputError, match="an id without a module"):
         LearnedPolicy.load(folder)
-    found = json.loads((OLD / "evaluation.json").read_text()) | {"environment": "harm:exo/ElbowLift-v1"}
+    found = json.loads((OLD / "evaluation.json").read_text()) | {"environment": "harm:exo/ElbowLift-v2"}
     (tmp_path / "evaluation.json").write_text(json.dumps(found))
     with pytest.raises(InputError, match="environment = 'harm:"):
         read_evaluation(tmp_path / "evaluation.json")

@@ -1,4 +1,4 @@
-"""Control periods of exo/ElbowLift-v1 per second at 50 Hz, resets included, as ratios to MyoSuite's exoskeleton elbow.
+"""Control periods of exo/ElbowLift-v2 per second at 50 Hz, resets included, as ratios to MyoSuite's exoskeleton elbow.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/env_speed.py
 

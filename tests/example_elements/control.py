@@ -6,15 +6,18 @@ from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.control.actuator import RopeActuator
 from dms_core.model.control.delayed_error import DelayedError
+from dms_core.model.control.impedance import ImpedanceController
 from dms_core.model.control.pid import Pid
 from dms_core.model.control.reference_filter import ReferenceFilter
 from dms_core.model.element import GROUND
 from dms_core.model.geometry.frames import quaternion
+from dms_core.model.geometry.path import PathPoint
+from dms_core.model.ropes.rope_force import RopeForce
 from dms_core.model.signals import Input
 from dms_core.model.system import System
 from tests.example_elements import Example
 
-INPUTS = ("psi", "wish", "pull", "authority")
+INPUTS = ("psi", "wish", "pull", "authority", "stiffness", "damping", "share")
 
 
 def controlled(*forces, sensors=(), body_i: str = "upper") -> System:
@@ -112,9 +115,55 @@ def actuator_limit() -> Example:
     return _actuator_pid((1.5, 3.0), width=80.0, max_tension=90.0)
 
 
+def _rope(name: str, upper, lower, body_i: str = "upper") -> RopeForce:
+    ends = (PathPoint(body=body_i, point=upper), PathPoint(body="lower", point=lower))
+    return RopeForce(name=name, path=ends, tension=1.0)
+
+
+UP, DOWN = ((0.4, 0.5, 0.1), (0.3, -0.2, 0.0)), ((0.5, -0.4, 0.0), (-0.1, 0.4, 0.1))
+"""Ends of two ropes that turn the hinge both ways."""
+
+
+def _impedance(body_i: str = "upper", **changes) -> Example:
+    ropes = [_rope(name, *ends, body_i) for name, ends in (("up", UP), ("down", DOWN))]
+    element = ImpedanceController(
+        **{
+            "name": "soft", "joint": "hinge", "ropes": ("up", "down"), "stiffness": "stiffness", "damping": "damping",
+            "share": "share", "carried_cos": 0.7, "carried_sin": 2.5, "least_leverage": 1e-6, **changes,
+        }
+    )  # fmt: skip
+    gains = {"stiffness": (5.0, 30.0), "damping": (0.5, 4.0), "share": (0.0, 2.0)}
+    return Example(controlled(*ropes, element, body_i=body_i), element, u=gains)
+
+
+def impedance_fixed() -> Example:
+    """A zero that rests, two ropes."""
+    return _impedance()
+
+
+def impedance_following() -> Example:
+    """A zero that follows, own pointers, the joint on the ground."""
+    pointers = {"pointer_i": (1.0, 0.0, 0.2), "pointer_j": (1.0, 0.3, 0.1)}
+    return _impedance(GROUND, ropes=("down",), relaxation_time=0.2, **pointers)
+
+
+def impedance_without_leverage() -> Example:
+    """Ropes that count with the least moment arm."""
+    return _impedance(least_leverage=2.0)
+
+
+def actuator_rate() -> Example:
+    """The rate of an impedance controller's coordinate, inside the smoothing."""
+    soft = _impedance()
+    motor = RopeActuator(name="motor", rate_of="soft.up_impulse", time_constant=0.03, width=20.0, max_tension=100.0)
+    system = controlled(*soft.system.forces, motor)
+    return Example(system, motor, v={"soft.up_impulse": (-8.0, 8.0)})
+
+
 EXAMPLES = {
     "delayed_error": (delayed_chain, delayed_once),
+    "impedance_controller": (impedance_fixed, impedance_following, impedance_without_leverage),
     "pid": (pid_plain, pid_filtered, pid_both),
     "reference_filter": (reference_filter,),
-    "rope_actuator": (actuator_input, actuator_linear, actuator_blend, actuator_limit),
+    "rope_actuator": (actuator_input, actuator_linear, actuator_blend, actuator_limit, actuator_rate),
 }

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from dms_core.model.element import Force
-from dms_core.model.forces import FirstOrder, Gravity, JointSpringDamper, LumpedLoad, SecondOrder, SpringDamper
+from dms_core.model.forces import (
+    FirstOrder,
+    Gravity,
+    JointSpringDamper,
+    JointStop,
+    LumpedLoad,
+    SecondOrder,
+    SpringDamper,
+)
 from tests.example_elements import Example
 from tests.example_elements.constraints import HINGE
 from tests.example_elements.pair import pair
@@ -56,6 +64,16 @@ def joint_spring_without_damping() -> Example:
     return _force(JointSpringDamper(name="spring", joint="hinge", stiffness=8.0))
 
 
+def stop() -> Example:
+    """Beyond the highest angle: the hinge of the pair starts at -2.02 rad."""
+    return _force(JointStop(name="stop", joint="hinge", lowest=-3.7, highest=-3.5, stiffness=8.0, dissipation=0.05))
+
+
+def lower_stop_without_dissipation() -> Example:
+    """Below the lowest angle, the tighter pattern."""
+    return _force(JointStop(name="stop", joint="hinge", lowest=-0.6, highest=-0.4, stiffness=8.0))
+
+
 def lag() -> Example:
     """Driven by an input."""
     return _force(FirstOrder(name="lag", time_constant=0.04, gain=3.0, input="u", start=0.2), "u")
@@ -81,6 +99,7 @@ EXAMPLES = {
     "lumped_load": (load, following_load, pure_moment),
     "spring_damper": (spring, undamped_spring),
     "joint_spring_damper": (joint_spring, joint_spring_without_damping),
+    "joint_stop": (stop, lower_stop_without_dissipation),
     "first_order": (lag, free_lag),
     "second_order": (oscillator, free_oscillator),
 }

@@ -14,4 +14,4 @@ def env():
 @pytest.fixture
 def make():
     """gymnasium.make of our environment."""
-    return lambda **settings: gymnasium.make("exo/ElbowLift-v1", **settings)
+    return lambda **settings: gymnasium.make("exo/ElbowLift-v2", **settings)

@@ -22,7 +22,7 @@ sys.argv.append(repr((end - middle) / (middle - begin)))
 USE = """
 import sys
 import gymnasium
-env = gymnasium.make("exo_env:exo/ElbowLift-v1")
+env = gymnasium.make("exo_env:exo/ElbowLift-v2")
 env.reset(seed=0)
 env.step(env.action_space.sample())
 """

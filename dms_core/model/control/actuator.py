@@ -2,7 +2,8 @@
 
     T v_tau + q_tau - tau_cmd = 0          q_tau the tension [N], T the time constant [s]
 
-The command is an input, or comes from a PID controller with coordinate q_c (eq. 26):
+The command is an input, or comes from a controller: from a PID controller with coordinate q_c (eq. 26), or from any
+coordinate whose rate v_c is the wanted tension (an impedance controller's), for which kp = 1, ki = kd = 0:
 
     x = sign authority (ki q_c + kp v_c + kd vdot_c)
     tau_cmd = pretension + P(x)                                              a rope cannot push
@@ -79,7 +80,7 @@ def pulled_tension(x, width, limit):
 
 @compiled
 def rope_actuator(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
-    """ip: from a PID, has authority."""
+    """ip: from a controller, has authority."""
     T, pretension, limit = par[ACTUATOR.time_constant], par[ACTUATOR.pretension], par[ACTUATOR.limit]
     tension = 0.0
     if ip[0] == 0:
@@ -116,7 +117,7 @@ def rope_actuator_by_input(ip, par, q, v, a, u, Ju):
 class RopeActuator(Force):
     """A motor that pulls a rope: owns the coordinate 'tension' [N], which ropes read.
 
-    Give one source of the command, an input or a PID controller.
+    Give one source of the command: an input, a PID controller, or a coordinate of another controller.
     """
 
     kind: ClassVar[str] = "rope_actuator"
@@ -124,6 +125,9 @@ class RopeActuator(Force):
     input_kernel: ClassVar = rope_actuator_by_input
     command: str | None = Field(default=None, description="name of the input that commands a tension [N]")
     pid: str | None = Field(default=None, description="name of the PID controller that commands the tension")
+    rate_of: str | None = Field(
+        default=None, description="coordinate of a controller whose rate is the wanted tension [N], by its full name"
+    )
     sign: Literal[1, -1] = Field(
         default=1, description="+1 pulls for a positive PID command (agonist), -1 antagonist [-]"
     )
@@ -140,10 +144,12 @@ class RopeActuator(Force):
 
     @model_validator(mode="after")
     def _one_source(self):
-        if (self.command is None) == (self.pid is None):
-            raise ValueError("give either 'command' (an input) or 'pid' (a controller), not both or neither")
+        if sum(x is not None for x in (self.command, self.pid, self.rate_of)) != 1:
+            raise ValueError("give one of 'command' (an input), 'pid' and 'rate_of' (of controllers), and no other")
         if self.command is not None and (self.authority is not None or self.sign != 1):
-            raise ValueError("'authority' and 'sign' shape a PID command; an input commands the tension itself")
+            raise ValueError(
+                "'authority' and 'sign' shape a controller's command; an input commands the tension itself"
+            )
         if self.max_tension is not None and self.max_tension - self.pretension < self.width:
             raise ValueError(
                 f"max_tension = {self.max_tension} N must exceed pretension = {self.pretension} N by at least the "
@@ -169,21 +175,27 @@ class RopeActuator(Force):
         """The tension, and the PID's coordinate with its gains."""
         limit = 0.0 if self.max_tension is None else self.max_tension - self.pretension
         own = f"{self.name}.tension"
-        flags = (int(self.pid is not None), int(self.authority is not None))
-        if self.pid is None:
+        flags = (int(self.command is None), int(self.authority is not None))
+        if self.command is not None:
             one = np.ones((1, 1), bool)
             pattern = Pattern(one, one, ~one)
             return Placement((), (own,), self.input_names(), flags, self._numbers(limit, 0.0, 0.0, 0.0), pattern)
-        gains = system.element(self.pid, Pid)
+        source, (ki, kp, kd) = self._controller(system)
         row = np.array([[True, True], [False, False]])
-        pattern = Pattern(row, row, np.array([[False, gains.kd > 0.0], [False, False]]))
         return Placement(
-            coordinates=(own, f"{self.pid}.error_integral"),
+            coordinates=(own, source),
             inputs=self.input_names(),
             integers=flags,
-            numbers=self._numbers(limit, gains.ki, gains.kp, gains.kd),
-            pattern=pattern,
+            numbers=self._numbers(limit, ki, kp, kd),
+            pattern=Pattern(row, row, np.array([[False, kd > 0.0], [False, False]])),
         )
+
+    def _controller(self, system) -> tuple[str, tuple[float, float, float]]:
+        """Coordinate that commands, and the gains ki, kp, kd on its value, rate and second derivative."""
+        if self.rate_of is not None:
+            return self.rate_of, (0.0, 1.0, 0.0)
+        gains = system.element(self.pid, Pid)
+        return f"{self.pid}.error_integral", (gains.ki, gains.kp, gains.kd)
 
     def _numbers(self, limit: float, ki: float, kp: float, kd: float) -> tuple[float, ...]:
         return numbers_at(

@@ -16,15 +16,9 @@ from pydantic import Field
 from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.geometry.angle import (
-    add_angle_hessian,
-    add_angle_rate_gradient,
-    angle_directions,
-    angle_frame,
-    angle_rate,
-    joint_angle,
-)
-from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated, vec
+from dms_core.model.forces.joint_moment import put_joint_moment
+from dms_core.model.geometry.angle import angle_frame, angle_rate, joint_angle
+from dms_core.model.geometry.rotations import vec
 from dms_core.model.places import numbers_at
 
 
@@ -44,33 +38,6 @@ JOINT_SPRING = JointSpringNumbers()
 
 
 @compiled
-def _angle_gradient(f, g, h, q):
-    """theta_q by the Euler parameters of both bodies: an 8-tuple."""
-    m, _ = angle_directions(0, 7, f, g, h, q)
-    x = k_times(rotated(q, 7, h), m, euler_parameters(q, 0))
-    y = k_times(rotated(q, 0, m), h, euler_parameters(q, 7))
-    return (
-        2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * y[0], 2.0 * y[1], 2.0 * y[2], 2.0 * y[3],
-    )  # fmt: skip
-
-
-@compiled
-def _place(i):
-    """Local coordinate of entry i of the 8-tuple."""
-    return 3 + i if i < 4 else 6 + i
-
-
-@compiled
-def _angle_rate_gradient(f, g, h, q, v, Jq):
-    """(theta_q v)_q as an 8-tuple; row 3 of Jq, still zero, is borrowed and given back as zero."""
-    add_angle_rate_gradient(3, 0, 7, f, g, h, q, v, 1.0, Jq)
-    w = (Jq[3, 3], Jq[3, 4], Jq[3, 5], Jq[3, 6], Jq[3, 10], Jq[3, 11], Jq[3, 12], Jq[3, 13])
-    for i in range(8):
-        Jq[3, _place(i)] = 0.0
-    return w
-
-
-@compiled
 def joint_spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """Row terms M theta_q^T."""
     f, g, h = vec(par, JOINT_SPRING.f), vec(par, JOINT_SPRING.g), vec(par, JOINT_SPRING.h)
@@ -80,16 +47,7 @@ def joint_spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     # theta jumps by a turn at +-pi; the spring is wound the short way round.
     twist -= turn * math.floor(twist / turn + 0.5)
     M = k * twist + c * angle_rate(0, 7, f, g, h, q, v)
-    b = _angle_gradient(f, g, h, q)
-    for i in range(8):
-        r[_place(i)] += M * b[i]
-    if level > 0:
-        w = _angle_rate_gradient(f, g, h, q, v, Jq)
-        add_angle_hessian(0, 7, f, g, h, q, M, Jq)
-        for i in range(8):
-            for j in range(8):
-                Jq[_place(i), _place(j)] += b[i] * (k * b[j] + c * w[j])
-                Jv[_place(i), _place(j)] += c * b[i] * b[j]
+    put_joint_moment(f, g, h, q, v, M, k, c, level, r, Jq, Jv)
 
 
 class JointSpringDamper(Force):

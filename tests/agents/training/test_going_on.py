@@ -94,7 +94,7 @@ def test_layout_comments_and_order_may_change(run):
     file = run / "config.yml"
     read = yaml.safe_load(file.read_text())
     turned = {key: dict(reversed(section.items())) for key, section in reversed(read.items())}
-    turned["exo/ElbowLift-v1"] |= {"frame_stack": 1}  # the default
+    turned["exo/ElbowLift-v2"] |= {"frame_stack": 1}  # the default
     text = "# a comment\n" + yaml.safe_dump(turned, sort_keys=False).replace("gamma: 0.98", "gamma: 0.980  # so")
     file.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
     assert resume(run, "n_timesteps=64") == 0
@@ -184,7 +184,7 @@ def test_folders_of_older_versions_go_on(run, capsys):
 
 
 def test_seed_and_environment_are_the_training_s(run, capsys):
-    assert main(["train", "--resume", str(run), "--seed", "0", "--env", "exo/ElbowLift-v1"]) == 0
+    assert main(["train", "--resume", str(run), "--seed", "0", "--env", "exo/ElbowLift-v2"]) == 0
     for given in (["--seed", "7"], ["--env", "exo/ElbowTrack-v1"]):
         before = content(run)
         assert main(["train", "--resume", str(run), *given]) == 2

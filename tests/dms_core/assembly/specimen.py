@@ -18,6 +18,7 @@ from dms_core.model import (
     Harmonic,
     Input,
     JointSpringDamper,
+    JointStop,
     LineGuide,
     LumpedLoad,
     MinimumJerk,
@@ -107,6 +108,7 @@ FORCES: tuple[DynamicElement, ...] = (
         free_length=0.2,
     ),
     JointSpringDamper(name="stop", joint="elbow", stiffness=8.0, damping=0.7),
+    JointStop(name="end", joint="elbow", lowest=1.0, highest=1.1, stiffness=5.0, dissipation=0.05),
     FirstOrder(name="lag", time_constant=0.1, gain=2.0, input="factor", start=0.4),
     SecondOrder(name="oscillator", mass=2.0, damping=0.3, stiffness=40.0, input="factor", start=0.2, start_rate=0.5),
     RopeForce(

@@ -40,7 +40,7 @@ def test_an_environment_of_ones_own_is_found_by_its_id(own_env, capsys):
 def test_an_older_version_is_looked_up_as_everywhere(capsys):
     lookup._say_once.cache_clear()
     assert main(["soak", "--steps", "5", "--env", "exo_env:exo/ElbowLift-v0"]) == 0
-    assert "exo/ElbowLift-v0 is now exo/ElbowLift-v1" in capsys.readouterr().err
+    assert "exo/ElbowLift-v0 is now exo/ElbowLift-v2" in capsys.readouterr().err
 
 
 def test_a_device_of_ones_own_and_another_drive(tmp_path, capsys):
@@ -57,7 +57,7 @@ def test_a_device_of_ones_own_and_another_drive(tmp_path, capsys):
     [
         (["--steps", "0"], "--steps 0: expected a whole number from 1"),
         (["--seed", "-1"], "--seed -1: expected a whole number from 0"),
-        (["--env", "exo/Nothing-v0"], "environment 'exo/Nothing-v0' is not registered. There are: exo/ElbowLift-v1"),
+        (["--env", "exo/Nothing-v0"], "environment 'exo/Nothing-v0' is not registered. There are: exo/ElbowLift-v2"),
         (["--env", "no_such_module:a/B-v0"], "module 'no_such_module' cannot be imported"),
         (["--env", "CartPole-v1"], "environment 'CartPole-v1' is a CartPoleEnv: expected one built on AssistanceEnv"),
         (["--exoskeleton", "leg"], "exoskeleton = 'leg': expected one of elbow"),

@@ -43,6 +43,7 @@ def two(**changes):
         ({"commands": two(holds=-1.0)}, "command 'two': holds = -1.0"),
         ({"commands": two(apart=math.nan)}, "command 'two': apart = nan; expected a finite number"),
         ({"commands": two(name="one")}, "commands = .'one', 'one'.; expected different names"),
+        ({"commands": two(carries=(1.0, math.nan))}, "command 'two': carries = .*; expected two finite moments"),
         ({"commands": ()}, r"commands = \[\]; expected different names, at least one"),
         ({"actions": ("up",)}, "1 actions for 2 commands"),
         ({"actions": ("up", "up")}, "actions = .*different names"),
@@ -54,7 +55,7 @@ def test_declarations(answers, complaint):
         check_drive(made(**answers), DEVICE)
 
 
-@pytest.mark.parametrize("kind", [RopeTension, PidSetpoint])
+@pytest.mark.parametrize("kind", list(ElbowLiftEnv.drives.values()))
 def test_shipped_drives_pass(kind):
     check_drive(kind(), DEVICE)
 

@@ -60,7 +60,15 @@ def test_authority_zero_leaves_the_ropes_slack():
     assert r["assistance"] == 0.0 and max(r["agonist_tension"], r["antagonist_tension"]) < 0.2
 
 
-@pytest.mark.parametrize("mode, hold", [("rope_tension", [-0.5, -0.9]), ("pid_setpoint", [0.0, 0.5])])
+@pytest.mark.parametrize(
+    "mode, hold",
+    [
+        ("rope_tension", [-0.5, -0.9]),
+        ("pid_setpoint", [0.0, 0.5]),
+        ("assist_moment", [0.3, -0.8]),
+        ("impedance", [0.0, 0.0, 0.2]),
+    ],
+)
 def test_default_tolerance_is_finer_than_the_encoder(mode, hold):
     """The default against 1e-5 under the same rough actions, over seven patients: the encoder's step is 1.5e-3 rad.
 
@@ -74,7 +82,7 @@ def test_default_tolerance_is_finer_than_the_encoder(mode, hold):
             env.reset(seed=seed)
             angles.append([])
             for _ in range(100):
-                env.step(np.array(hold) + actions.uniform(-0.1, 0.1, 2))
+                env.step(np.array(hold) + actions.uniform(-0.1, 0.1, len(hold)))
                 angles[-1].append(env.readings()["elbow_angle.angle"])
         errors.append(np.abs(np.subtract(*angles)).max())
     assert np.median(errors) < 1e-3, errors

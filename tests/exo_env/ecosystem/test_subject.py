@@ -38,6 +38,33 @@ def test_the_shipped_file_is_read_as_it_is():
         ),
         (("joints", "r_elbow", "axis_i"), [0.0, 0.0, 0.0], "joints.r_elbow: axis_i = (0.0, 0.0, 0.0) has no direction"),
         (("joints", "r_elbow", "point_i"), "here", "joints.r_elbow: JointFacts: point_i = 'here'"),
+        (
+            ("joints", "r_elbow", "stop", "stiffness"),
+            0.0,
+            "joints.r_elbow: JointFacts: stop: StopFacts: stiffness = 0.0",
+        ),
+        (("joints", "r_elbow", "stop", "highest"), -0.1, "StopFacts: lowest = 0 must be below highest = -0.1"),
+        (
+            ("joints", "r_elbow", "stop", "highest"),
+            142.0,
+            "joints.r_elbow: JointFacts: stop: StopFacts: highest = 142.0",
+        ),
+        (
+            ("joints", "r_elbow", "stop", "dissipation"),
+            None,
+            "joints.r_elbow: JointFacts: stop: StopFacts: 'dissipation' is missing",
+        ),
+        (
+            ("joints", "r_elbow", "stop", "stifness"),
+            1.0,
+            "joints.r_elbow: JointFacts: stop: StopFacts: unknown key 'stifness'",
+        ),
+        (("joints", "r_elbow", "stop"), [0.0, 2.4], "joints.r_elbow"),
+        (
+            ("joints", "r_shoulder", "stop"),
+            ARM26["joints"]["r_elbow"]["stop"],
+            "joints.r_shoulder: stop: only the elbow",
+        ),
         (("muscles",), {}, "muscles = {}"),
         (("muscles", "BRA", "optimal_fibre_length"), None, "muscles.BRA: 'optimal_fibre_length' is missing"),
         (("muscles", "BRA", "path"), [], "muscles.BRA: MuscleFacts: path = []"),

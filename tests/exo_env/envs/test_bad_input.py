@@ -127,7 +127,7 @@ def test_a_population_file_with_a_wrong_value(tmp_path):
 
 
 def test_a_first_reset_that_is_refused_leaves_the_made_environment_usable():
-    env = gymnasium.make("exo_env:exo/ElbowLift-v1")
+    env = gymnasium.make("exo_env:exo/ElbowLift-v2")
     with pytest.raises(InputError, match="foo"):
         env.reset(seed=0, options={"foo": 1})
     env.reset(seed=0)

@@ -99,4 +99,4 @@ def test_a_batch_of_single_periods_resets_for_ever(mode):
 @pytest.mark.parametrize("steps", [0, -2, 1.5, "4", True])
 def test_wrong_largest_numbers_of_steps(steps):
     with pytest.raises(InputError, match="max_episode_steps = "):
-        gymnasium.make_vec("exo/ElbowLift-v1", max_episode_steps=steps)
+        gymnasium.make_vec("exo/ElbowLift-v2", max_episode_steps=steps)

@@ -38,7 +38,7 @@ def test_readings_hold_what_the_figures_show(env):
 
 @pytest.mark.filterwarnings("ignore:.*out of date")
 def test_the_old_version_names_the_new_one():
-    with pytest.raises(gymnasium.error.DeprecatedEnv, match="exo/ElbowLift-v1"):
+    with pytest.raises(gymnasium.error.DeprecatedEnv, match="exo/ElbowLift-v2"):
         gymnasium.make("exo_env:exo/ElbowLift-v0")
 
 
@@ -90,7 +90,7 @@ def test_reset_options_that_stay():
 
 
 def test_a_reference_that_the_episode_cuts_off_is_told():
-    with pytest.warns(UserWarning, match="may take 8.9 s, and an episode ends after 6 s"):
+    with pytest.warns(UserWarning, match="may take 9.3 s, and an episode ends after 6 s"):
         ElbowLiftEnv(reference={"duration": 4.0, "pause": 0.5})
 
 

@@ -12,11 +12,13 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo
 
-ID = "exo/ElbowLift-v1"
+from exo_env.envs.elbow_lift import ElbowLiftEnv
+
+ID = "exo/ElbowLift-v2"
 ACTION = np.array([-0.4, -0.9], np.float32)
 
 
-@pytest.mark.parametrize("mode", ["rope_tension", "pid_setpoint"])
+@pytest.mark.parametrize("mode", list(ElbowLiftEnv.drives))
 @pytest.mark.parametrize("groups", [["device"], ["privileged", "emg", "device"]])
 def test_checker_finds_nothing(make, mode, groups):
     with warnings.catch_warnings():
@@ -43,7 +45,7 @@ def test_spec_goes_through_json(make):
 
 RUN = """
 import numpy as np, gymnasium, exo_env, sys
-env = gymnasium.make("exo/ElbowLift-v1", observation=["device", "emg", "privileged"]).unwrapped
+env = gymnasium.make("exo/ElbowLift-v2", observation=["device", "emg", "privileged"]).unwrapped
 {before}
 found = [env.reset(seed=int(sys.argv[1]))[0]]
 for k in range(30):

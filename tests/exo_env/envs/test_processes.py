@@ -20,7 +20,7 @@ needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cann
 
 
 def _made():
-    return gymnasium.make("exo_env:exo/ElbowLift-v1", episode_duration=0.2)
+    return gymnasium.make("exo_env:exo/ElbowLift-v2", episode_duration=0.2)
 
 
 def _in_a_fork(work):

@@ -80,11 +80,11 @@ def test_wrappers_and_settings_of_gymnasiums_vectors(registered, mode):
 @pytest.mark.parametrize("given", [{"wrappers": (Passing,)}, {"vector_kwargs": {"copy": False}}])
 def test_what_gymnasium_itself_refuses_for_a_batch(given):
     with pytest.raises(gymnasium.error.Error):
-        gymnasium.make_vec("exo/ElbowLift-v1", **given)
+        gymnasium.make_vec("exo/ElbowLift-v2", **given)
 
 
 def test_modes_of_a_batch_by_keyword():
-    made = gymnasium.make_vec("exo/ElbowLift-v1", 2, autoreset_mode="SameStep", threads=1, max_episode_steps=3)
+    made = gymnasium.make_vec("exo/ElbowLift-v2", 2, autoreset_mode="SameStep", threads=1, max_episode_steps=3)
     assert made.metadata["autoreset_mode"] is gymnasium.vector.AutoresetMode.SAME_STEP
     assert ends(made) == 3
 
@@ -100,13 +100,13 @@ def test_the_checkers_are_silent(registered, mode):
 
 
 def test_a_wrapper_made_from_a_spec():
-    env = RescaleObservation(gymnasium.make("exo/ElbowLift-v1", load=1.0), np.float32(-1.0), np.float32(1.0))
+    env = RescaleObservation(gymnasium.make("exo/ElbowLift-v2", load=1.0), np.float32(-1.0), np.float32(1.0))
     again = gymnasium.make(env.spec)
     np.testing.assert_array_equal(again.reset(seed=0)[0], env.reset(seed=0)[0])
 
 
 def test_attributes_and_calls_of_all_worlds():
-    made = gymnasium.make_vec("exo/ElbowLift-v1", num_envs=3, threads=1)
+    made = gymnasium.make_vec("exo/ElbowLift-v2", num_envs=3, threads=1)
     made.reset(seed=7)
     worlds = made.unwrapped
     assert worlds.get_attr("action_mode") == ("rope_tension",) * 3

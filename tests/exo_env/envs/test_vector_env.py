@@ -9,7 +9,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv
 
 from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
 
-ID, SETTINGS = "exo_env:exo/ElbowLift-v1", {"episode_duration": 0.1, "observation": ["device", "emg"]}
+ID, SETTINGS = "exo_env:exo/ElbowLift-v2", {"episode_duration": 0.1, "observation": ["device", "emg"]}
 SEEDS, STEPS = [4, 5], 12
 ACTIONS = np.random.default_rng(0).uniform(-1.0, 1.0, (STEPS, len(SEEDS), 2)).astype(np.float32)
 
@@ -77,7 +77,7 @@ def test_a_vector_gives_what_its_environments_give_alone(kind):
 
 @pytest.mark.parametrize(("steps", "ends"), [(4, 4), (100, 10), (-1, 10), (None, 10)])
 def test_gymnasium_may_give_a_largest_number_of_steps(steps, ends):
-    worlds = gymnasium.make_vec("exo/ElbowLift-v1", num_envs=2, episode_duration=0.2, max_episode_steps=steps)
+    worlds = gymnasium.make_vec("exo/ElbowLift-v2", num_envs=2, episode_duration=0.2, max_episode_steps=steps)
     try:
         worlds.reset(seed=0)
         truncated = [worlds.step(np.zeros((2, 2)))[3].tolist() for _ in range(ends)]

@@ -26,8 +26,11 @@ def known(patient=None, load=1.0):
 
 def need(patient, model, course):
     """Need of a movement."""
-    lacking = np.zeros(len(course))
-    found, scale = put_lacking(patient.row(), model.arm, model.load, DEVICE.lower_link.numbers(), course, lacking)
+    lacking, weights = np.zeros(len(course)), np.full(len(course), model.load.weight)
+    link = DEVICE.lower_link.numbers()
+    found, scale = put_lacking(
+        patient.row(), model.arm, model.load, weights, link, course, np.zeros(len(course)), lacking
+    )
     return Need(found, lacking, scale)
 
 

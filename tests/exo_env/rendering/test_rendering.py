@@ -15,7 +15,7 @@ pytest.importorskip("pygame")
 def env(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     settings = {"render_mode": "rgb_array", "patient": "stroke_mild", "action_mode": "pid_setpoint"}
-    made = gymnasium.make("exo/ElbowLift-v1", **settings)
+    made = gymnasium.make("exo/ElbowLift-v2", **settings)
     yield made
     made.close()
 

@@ -46,14 +46,14 @@ def test_share():
     assert device_share(5.0, -1.0) == 0.0 and device_share(-1.0, 5.0) == 1.0 and device_share(0.0, 0.0) == 0.0
 
 
-def test_an_arm_pulled_straight_ends_the_episode():
-    env = ElbowLiftEnv(patient=LIMP, load=1.0)
+def test_an_arm_below_the_lowest_angle_ends_the_episode():
+    env = ElbowLiftEnv(patient=LIMP, load=1.0, limits={"lowest_deg": 15.0})
     env.reset(seed=0)
     for _ in range(100):
         _, reward, terminated, truncated, info = env.step(np.array([-1.0, 1.0]))
         if terminated:
             break
-    assert terminated and not truncated and "outside 0 to 142 deg" in info["event"]
+    assert terminated and not truncated and "outside 15 to 147 deg" in info["event"]
     assert info["reward_terms"]["unsafe"] == -1.0 and reward < -99.0 and not info["solver_failed"]
 
 

@@ -13,7 +13,7 @@ from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.world import batch as batch_module
 from exo_env.world.batch import Batch
 
-ENV = "exo_env:exo/ElbowLift-v1"
+ENV = "exo_env:exo/ElbowLift-v2"
 SHORT = {"episode_duration": 0.5, "observation": ["device", "emg", "privileged"]}
 
 
@@ -36,7 +36,7 @@ def _same(a, b, where=""):
             np.testing.assert_array_equal(x, y, err_msg=here)
 
 
-@pytest.mark.parametrize("mode", ["rope_tension", "pid_setpoint"])
+@pytest.mark.parametrize("mode", list(ElbowLiftEnv.drives))
 @pytest.mark.parametrize("autoreset", list(AutoresetMode))
 def test_a_batch_is_gymnasiums_own_loop_to_the_last_bit(mode, autoreset):
     settings = SHORT | {"action_mode": mode}
@@ -47,7 +47,7 @@ def test_a_batch_is_gymnasiums_own_loop_to_the_last_bit(mode, autoreset):
     _same(told_a, told_b)
     actions, ended = np.random.default_rng(0), 0
     for _ in range(60):
-        action = actions.uniform(-1.0, 1.0, (5, 2)).astype(np.float32)
+        action = actions.uniform(-1.0, 1.0, batch.action_space.shape).astype(np.float32)
         one, other = batch.step(action), loop.step(action)
         for x, y in zip(one[:4], other[:4], strict=True):
             np.testing.assert_array_equal(x, y)

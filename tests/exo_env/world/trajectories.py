@@ -18,7 +18,14 @@ CASES = {
     "setpoint of the PID": {"patient": "evaluation", "action_mode": "pid_setpoint"},
     "two repetitions": {"patient": "stroke_severe", "action_mode": "pid_setpoint", "repetitions": 2},
     "200 Hz, no noise": {"patient": "healthy", "control_rate": 200.0, "noise": False},
+    "assist moment": {"patient": "mixed", "action_mode": "assist_moment"},
+    "impedance": {"patient": "evaluation", "action_mode": "impedance"},
 }
+FIRST = {
+    "rope_tension": [-0.4, -0.8], "pid_setpoint": [-0.4, -0.8], "assist_moment": [0.2, -0.8],
+    "impedance": [-0.4, -0.8, 0.0],
+}  # fmt: skip
+"""First action in each mode."""
 STEPS, EVERY = 30, 5
 COLUMNS = ("elbow_angle.angle", "elbow_angle.rate", "muscle_moment", "exo_moment", "elbow_reaction", "effort")
 
@@ -29,7 +36,7 @@ def rows() -> list[dict[str, str]]:
     for number, (case, settings) in enumerate(CASES.items()):
         env, actions = ElbowLiftEnv(**settings), np.random.default_rng(number)
         observation, info = env.reset(seed=number)
-        action, total = np.array([-0.4, -0.8]), 0.0
+        action, total = np.array(FIRST[env.action_mode]), 0.0
         for k in range(STEPS + 1):
             if k % EVERY == 0:
                 r = env.readings()
@@ -38,7 +45,7 @@ def rows() -> list[dict[str, str]]:
                 table.append(
                     {"case": case, "step": str(k)} | {n: f"{x:.9g}" for n, x in zip(names, values, strict=True)}
                 )
-            action = np.clip(action + 0.1 * actions.normal(size=2), -1.0, 1.0)
+            action = np.clip(action + 0.1 * actions.normal(size=env.actions), -1.0, 1.0)
             observation, reward, *_ = env.step(action)
             total += reward
     return table

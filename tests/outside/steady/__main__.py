@@ -77,7 +77,7 @@ if __name__ == "__main__":
     found = {name: run(f"{name}-v0") | evaluation(f"{name}-v0") for name in ("HoldStill", "TwoMuscles")}
     if "--speed" in sys.argv:
         shipped = {"observation": ["device"], "patient": "stroke_mild", "episode_duration": 2.0}
-        found["ratio"] = cost("steady:steady/HoldStill-v0", {}) / cost("exo_env:exo/ElbowLift-v1", shipped)
+        found["ratio"] = cost("steady:steady/HoldStill-v0", {}) / cost("exo_env:exo/ElbowLift-v2", shipped)
     found["file"] = sys.modules["exo_env"].__file__
     found["lift"] = "exo_env.tasks.lift" in sys.modules
     print(json.dumps(found))

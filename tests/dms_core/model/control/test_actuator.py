@@ -111,9 +111,9 @@ def test_start_is_the_tension_of_the_command_without_error() -> None:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({}, "give either 'command'"),
-        ({"command": "pull", "pid": "pid"}, "give either 'command'"),
-        ({"command": "pull", "sign": -1}, "shape a PID command"),
+        ({}, "give one of 'command'"),
+        ({"command": "pull", "pid": "pid"}, "give one of 'command'"),
+        ({"command": "pull", "sign": -1}, "shape a controller's command"),
         ({"pid": "pid", "pretension": 5.0, "max_tension": 5.5}, "must exceed pretension"),
         ({"pid": "pid", "max_tension": 10.0, "start_tension": 500.0}, "start_tension = 500.0 N: Expected at most"),
         ({"pid": "pid", "time_constant": 0.0}, "time_constant = 0.0"),

@@ -120,7 +120,7 @@ class TestJointSpringDamper:
             _calls(JointSpringDamper(name="s", joint="knee"))
 
 
-@pytest.mark.parametrize("kind", ["spring_damper", "joint_spring_damper"])
+@pytest.mark.parametrize("kind", ["spring_damper", "joint_spring_damper", "joint_stop"])
 def test_internal_forces_do_no_work_on_a_common_motion(kind):
     """Action is minus reaction, in force and in moment."""
     for example in examples()[kind]:

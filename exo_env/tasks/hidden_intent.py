@@ -1,0 +1,179 @@
+"""The task of exo/HiddenIntent: help a patient who moves where and when he likes, which nothing tells the device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dms_core.compiled.jit import compiled
+from dms_core.kernels import floats, inner, matrix
+from exo_env.ecosystem.sensors import FOREARM_IMU
+from exo_env.patient.distributions import Distribution
+from exo_env.places import places
+from exo_env.settings import Settings
+from exo_env.tables import DRAW, DRIVE, PLAN, WORLD
+from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading
+from exo_env.tasks.checked import begins
+from exo_env.tasks.elbow import (
+    ELBOW,
+    action_channel,
+    device_channels,
+    elbow_readings,
+    privileged_channels,
+    read_elbow,
+)
+from exo_env.tasks.electrodes import electrode_draws, put_envelopes
+from exo_env.tasks.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
+from exo_env.tasks.intentions import Intentions
+from exo_env.tasks.limits import EVENTS, Limits, exceeded, limit_sentence
+from exo_env.tasks.movement import Movement
+from exo_env.tasks.rewards import term_values
+from exo_env.tasks.task import (
+    NOTHING,
+    Reported,
+    Task,
+    Values,
+    end_with,
+    event_of,
+    first_of,
+    readings,
+    step_of,
+    task_numbers,
+    terms_of,
+)
+
+PREVIEW = (0.1, 0.2, 0.4)
+"""How far ahead the plan is tabulated for those who are shown it [s]; assumed."""
+EPISODES_RENEWED = 0.1
+"""Share of the episodes in which electrodes are put on anew; assumed."""
+
+
+def intent_readings(parts: Parts) -> list[Reading]:
+    """The readings of every elbow task, what the electrodes and the inertial sensor show, and the patient's plan."""
+    force = tuple(f"{FOREARM_IMU}.specific_force.{x}" for x in "xy")
+    return [
+        *elbow_readings(parts),
+        Reading("gyro", "rad/s", sensors=(f"{FOREARM_IMU}.angular_velocity.z",)),
+        Reading("specific_force", "m/s^2", ("x", "y"), sensors=force),
+        Reading("emg", "-", parts.muscles),
+        Reading("intent_acceleration", "rad/s^2"),
+        Reading("preview", "rad", tuple(f"in {t} s" for t in PREVIEW)),
+        Reading("needed_moment", "Nm"),
+        Reading("lacking_moment", "Nm"),
+        Reading("opposing_power", "W"),
+    ]
+
+
+INTENT = places(reading.name for reading in intent_readings(Parts((), (), ())))
+"""Place of each reading in the list of `intent_readings`."""
+begins(INTENT, intent_readings)
+
+
+@compiled
+def read_intent(w):
+    """Fill the readings of `intent_readings` that no sensor gives."""
+    read_elbow(w)
+    r, at, plan, k = readings(w), first_of(w), inner(w, WORLD.plan), step_of(w)
+    preview, course = matrix(plan, PLAN.preview), matrix(plan, PLAN.course)
+    for i in range(preview.shape[1]):
+        r[at[INTENT.preview] + i] = preview[k, i]
+    m = at[INTENT.reaction] - at[INTENT.activation]
+    put_envelopes(
+        r[at[INTENT.activation] : at[INTENT.activation] + m], floats(inner(w, WORLD.draw), DRAW.task),
+        k / (course.shape[0] - 1), r[at[INTENT.emg] : at[INTENT.emg] + m],
+    )  # fmt: skip
+    needed = floats(plan, PLAN.needed)[k]
+    r[at[INTENT.intent_acceleration]], r[at[INTENT.needed_moment]] = course[k, 2], needed
+    r[at[INTENT.lacking_moment]] = floats(plan, PLAN.lacking)[k]
+    r[at[INTENT.opposing_power]] = opposing_power(r[at[ELBOW.exo_moment]], needed, course[k, 1])
+
+
+@compiled
+def judge_intent(w):
+    """Check the limits, then fill the reward terms of intent_rewards.py."""
+    r, at, plan, drive = readings(w), first_of(w), inner(w, WORLD.plan), inner(w, WORLD.drive)
+    reaction, scale, terms = r[at[ELBOW.reaction]], floats(plan, PLAN.scale)[0], terms_of(w)
+    tensions = r[at[ELBOW.tension] : at[ELBOW.muscle_moment]]
+    if event_of(w) == NOTHING:
+        end_with(w, exceeded(task_numbers(w), r[at[ELBOW.angle]], tensions, reaction))
+    term_values(
+        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], floats(plan, PLAN.lacking)[step_of(w)], scale, reaction,
+        floats(drive, DRIVE.action), floats(drive, DRIVE.before), event_of(w) != NOTHING, terms,
+    )  # fmt: skip
+    terms[INTENT_TERM.opposition] = opposition(r[at[INTENT.opposing_power]], scale)
+
+
+class HiddenIntentTask(Task):
+    """The task: help the patient to where the patient wants, as much as is needed, against nobody."""
+
+    weights_type: ClassVar[type[Settings]] = IntentWeights
+    limits_type: ClassVar[type[Settings]] = Limits
+    movement_type: ClassVar[type[Movement]] = Intentions
+    limits: Limits
+    events: ClassVar[tuple[str, ...]] = EVENTS
+    preview: ClassVar[tuple[float, ...]] = PREVIEW
+    revealing: ClassVar[tuple[str, ...]] = ("privileged",)
+    reported: ClassVar[tuple[Reported, ...]] = (
+        Reported("tracking_error_deg", "error", 180.0 / math.pi),
+        Reported("device_share", "device_share"),
+        Reported("effort", "effort"),
+        Reported("elbow_reaction", "reaction"),
+        Reported("opposing_power", "opposing_power"),
+    )
+    read, judge = read_intent, judge_intent
+
+    def declared_readings(self, parts: Parts) -> list[Reading]:
+        """The readings of `intent_readings`."""
+        return intent_readings(parts)
+
+    def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
+        """Four groups: what a device measures, without reference or clock; EMG; an inertial sensor; all that is known.
+
+        Noise of the inertial sensor on the wrist is assumed: a consumer sensor behind a filter of 20 Hz.
+        """
+        plan = [
+            Channel("elbow", 1.0, -0.5, 3.0, reading="angle"),
+            Channel("elbow_rate", 1.0, -20.0, 20.0, reading="rate"),
+            Channel("activation", 1.0, 0.0, 1.0),
+            Channel("intent", 1.0, -0.5, 3.0, reading="reference"),
+            Channel("intent_rate", 1.0, -20.0, 20.0, reading="reference_rate"),
+            Channel("intent_acceleration", 10.0, -500.0, 500.0),
+            Channel("preview", 1.0, -0.5, 3.0),
+            Channel("needed_moment", 10.0, -500.0, 500.0),
+            Channel("lacking_moment", 10.0, -500.0, 500.0),
+        ]
+        return {
+            "device": [*device_channels(), action_channel()],
+            "emg": [Channel("emg", 1.0, 0.0, 2.0, Imperfection(deviation=0.03, delay=0.02))],
+            "imu": [
+                Channel("gyro", 1.0, -20.0, 20.0, Imperfection(deviation=0.02)),
+                Channel("specific_force", 10.0, -200.0, 200.0, Imperfection(deviation=0.2)),
+            ],
+            "privileged": [*privileged_channels(), *plan],
+        }
+
+    def draws(self) -> Mapping[str, Distribution]:
+        """What goes wrong with the electrodes in an episode."""
+        return electrode_draws(self.parts.muscles, self.renewed())
+
+    def renewed(self) -> object:
+        """Distribution of the part of the episode after which electrodes are put on anew; above 1 for never."""
+        return {"uniform": [0.0, 1.0 / EPISODES_RENEWED]}
+
+    def start_range(self) -> tuple[float, float]:
+        """The limits of the elbow [deg]."""
+        return self.limits.lowest_deg, self.limits.highest_deg
+
+    def sentence(self, event: str, values: Values) -> str:
+        """A sentence on the limit that was passed."""
+        angle, reaction = float(values("angle")[0]), float(values("reaction")[0])
+        return limit_sentence(event, self.limits, angle, float(values("tension").max()), reaction)
+
+
+class NewPatientTask(HiddenIntentTask):
+    """The same with one patient for long; electrodes are put on anew in the middle."""
+
+    def renewed(self) -> object:
+        """In the middle of the episode."""
+        return 0.5
