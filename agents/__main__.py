@@ -8,6 +8,7 @@ python -m agents export RUN --out DIR
 python -m agents report RUN [RUN ...] --out DIR
 python -m agents sweep --configs FILE [FILE ...] --seeds S [S ...] --out DIR
 python -m agents upper-bound --out FILE.csv
+python -m agents hindsight --out FILE.csv [--patients N] [--tries N] [--workers N]
 python -m agents video --policy A B --patient NAME --out FILE.mp4
 
 A command renews a folder that it wrote; a file that exists, or a folder of others, it replaces with --overwrite only.
@@ -22,6 +23,7 @@ from dms_core.command_line import run_command
 
 from .commands.evaluate import evaluate, policies
 from .commands.export import export
+from .commands.hindsight import hindsight
 from .commands.report import report
 from .commands.sweep import sweep
 from .commands.train import train
@@ -43,6 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
             "sweep": sweep,
             "tune-baselines": tune_baselines,
             "upper-bound": upper_bound,
+            "hindsight": hindsight,
             "video": video,
         },
         PROGRAM,

@@ -19,6 +19,7 @@ from exo_env.patient.population import population
 
 from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.episode import world_of
+from ..evaluation.fair_play import begin, shown
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
 from .options import device_settings, different_policies, repeated
@@ -105,7 +106,7 @@ class Stage:
         self.policy = policy
         self.env = world_of(policy, population(patient).model_dump(), environment, render_mode="rgb_array", **settings)
         self.observation, self.info = self.env.reset(seed=seed)
-        policy.reset(self.env)
+        begin(policy, self.env)
         world: Any = self.env.unwrapped
         self.rate, self.length = round(1.0 / world.period), round(world.duration / world.period) + 1
         self.over, self.event = False, ""
@@ -114,7 +115,7 @@ class Stage:
         """One control period, unless the episode is over."""
         if self.over:
             return
-        action = self.policy(self.observation, self.info)
+        action = self.policy(self.observation, shown(self.info, self.env))
         self.observation, _, terminated, truncated, self.info = self.env.step(action)
         self.over, self.event = terminated or truncated, str(self.info.get("event", ""))
 

@@ -13,6 +13,7 @@ from exo_env.patient.population import Source, population
 from ..environment import ENVIRONMENT
 from ..policies.policy import Policy
 from .episode import world_of
+from .fair_play import begin, shown
 
 READ = (
     "time", "elbow_angle.angle", "reference", "agonist_tension", "antagonist_tension", "muscle_moment", "exo_moment",
@@ -67,10 +68,10 @@ def time_course(
     env = world_of(policy, population(patient).model_dump(), environment, **settings)
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=options)
-    policy.reset(env)
+    begin(policy, env)
     info, rows, over = drawn, [world.readings()], False
     while not over:
-        observation, _, terminated, truncated, info = env.step(policy(observation, info))
+        observation, _, terminated, truncated, info = env.step(policy(observation, shown(info, env)))
         rows.append(world.readings())
         over = terminated or truncated
     env.close()
