@@ -8,6 +8,7 @@ from typing import Any
 from dms_core.errors import InputError
 
 from ..training.config import Config
+from ..training.config_file import TRAINING
 from ..training.records import RECORD, read_curve
 from ..training.run_folder import RunFolder
 from ..training.usable import checked_config
@@ -30,11 +31,37 @@ def planned(
     shares = []
     for path in configs:
         config = checked_config(path, changes, environment)
-        shares += [(config.content(), seed, str(out.resolve() / f"{path.stem}_{seed}")) for seed in seeds]
+        for seed in seeds:
+            folder = out.resolve() / f"{path.stem}_{seed}"
+            shares.append((config.placed(folder, seed).content(), seed, str(folder)))
     folders = [folder for _, _, folder in shares]
     if len(set(folders)) < len(folders):
         raise InputError("two trainings would share a folder; give different seeds, and files of different names.")
     return shares
+
+
+def in_order(shares: list[tuple[dict[str, Any], int, str]]) -> list[list[tuple[dict[str, Any], int, str]]]:
+    """Trainings in groups: those of a group learn from others, as teacher or to begin with, of earlier groups only.
+
+    Raises:
+        InputError: trainings wait for each other.
+    """
+    groups, left = [], list(shares)
+    while left:
+        waiting = {folder for _, _, folder in left}
+        group = [share for share in left if not _named_in(share[0]) & waiting]
+        if not group:
+            raise InputError(f"these trainings wait for each other: {', '.join(sorted(waiting))}.")
+        groups.append(group)
+        left = [share for share in left if share not in group]
+    return groups
+
+
+def _named_in(content: dict[str, Any]) -> set[str]:
+    """Policies that a training learns from."""
+    training = content[TRAINING]
+    teacher = (training.get("imitation") or {}).get("teacher")
+    return {name for name in (teacher, training.get("initial")) if name is not None}
 
 
 def train_share(content: dict[str, Any], seed: int, folder: str) -> dict[str, Any]:

@@ -168,6 +168,25 @@ class LearnedPolicy(Policy):
 
     def reset(self, env: gymnasium.Env) -> None:
         """Forget the last patient; an environment that the policy does not know is refused."""
+        self._check(env)
+        self.network.reset()
+
+    def begin(self, env: gymnasium.Env, n: int) -> None:
+        """Begin episodes in many worlds at once, for `act`.
+
+        Args:
+            env: one of their kind; one that the policy does not know is refused.
+            n: number of worlds.
+        """
+        self._check(env)
+        self.network.reset(n)
+
+    def act(self, observations: np.ndarray) -> np.ndarray:
+        """The actions held best in many worlds, shape (n, actions), after one more observation of each, (n, k)."""
+        return self.network(observations)
+
+    def _check(self, env: gymnasium.Env) -> None:
+        """Refuse an environment that shows or takes something else than that of the training."""
         facts, d = world_facts(env), self.description
         if not self._known:
             world: Any = env.unwrapped
@@ -182,7 +201,6 @@ class LearnedPolicy(Policy):
             if trained != here:
                 difference = brief(f"{trained}, not {here}")
                 raise InputError(f"policy '{self.name}' was trained with another {what}: {difference}.")
-        self.network.reset()
         if not self._known:
             self._say_where(env)
         self._known = True
