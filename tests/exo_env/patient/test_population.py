@@ -12,7 +12,7 @@ from exo_env.patient.distributions import distribution, weighted
 from exo_env.patient.patient import Patient
 from exo_env.patient.population import Population, population, shipped_populations
 
-SHIPPED = ("evaluation", "healthy", "mixed", "stroke_mild", "stroke_severe", "wide")
+SHIPPED = ("evaluation", "healthy", "mixed", "shifted", "stroke_mild", "stroke_severe", "wide")
 P = (np.arange(400) + 0.5) / 400
 """Probabilities at which quantiles are compared."""
 WORSE = {
@@ -50,7 +50,7 @@ def test_choice_and_constant():
     assert weighted((1.0, 0.0), 1.0) == 0
 
 
-def test_six_populations_are_shipped():
+def test_seven_populations_are_shipped():
     assert shipped_populations() == SHIPPED
 
 
@@ -67,7 +67,7 @@ def test_shipped_populations_give_patients(name):
 @pytest.mark.parametrize("name", [n for n in SHIPPED if n != "mixed"])
 def test_every_line_of_a_shipped_file_names_a_source_or_is_assumed(name):
     lines = (configs() / "patients" / f"{name}.yaml").read_text().splitlines()
-    if name in ("evaluation", "wide"):
+    if name in ("evaluation", "shifted", "wide"):
         assert any("All ranges are assumed" in line for line in lines)
         return
     begin = lines.index("fields:")
