@@ -56,7 +56,7 @@ from exo_env.tasks.channels import Parts, Slice
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import NOTHING, Task
-from exo_env.world.control_period import finish, run_period
+from exo_env.world.control_period import finish, move, next_stop, run_period
 from exo_env.world.episode import Episode
 from exo_env.world.held_episode import take_up
 from exo_env.world.readout import Readout
@@ -333,13 +333,14 @@ class AssistanceEnv(Copied, gymnasium.Env):
         """Go on where compiled code gave up: a singular matrix may need another order of elimination."""
         dynamics, status = self.world.dynamics, self.world.tables.status
         dynamics.result = RESULT_OF[int(status[STATUS.code])]
-        if status[STATUS.code] == MATRIX_SINGULAR:
-            dynamics.advance(float(self.world.times[status[STATUS.step] + 1]))
-        if dynamics.result is Result.INTERRUPTED:
-            raise KeyboardInterrupt
-        if dynamics.result is Result.SUCCESS:
-            status[STATUS.code] = DONE
+        while status[STATUS.code] == MATRIX_SINGULAR:
+            dynamics.advance(next_stop(self.world.packed.table))
+            if dynamics.result is Result.INTERRUPTED:
+                raise KeyboardInterrupt
+            if dynamics.result is not Result.SUCCESS:
+                break
             self.world.follow_dynamics()
+            dynamics.result = RESULT_OF[move(self.world.packed.table)]
         finish(self.world.packed.table)
 
     def happened(self) -> str | None:

@@ -25,9 +25,7 @@ def test_measures_without_readings_are_left_out_and_named():
     assert found["environment"] == BLIND and set(found["left_out"]) == NEED_MORE
     usual = {m.name for m in MEASURES if not m.special}
     for p in found["policies"].values():
-        assert set(p["summary"]) == usual - NEED_MORE | {
-            f"reward.{t}" for t in TERMS
-        }
+        assert set(p["summary"]) == usual - NEED_MORE | {f"reward.{t}" for t in TERMS}
         assert set(p["difference"]) == {"return", "peak_reaction_N"}
     (line,) = left_out_lines(found)
     assert "tracking, rms" in line and f"{BLIND} has no reading" in line and "elbow_angle.rate" in line
