@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,8 @@ Work = Callable[[Policy, Plan, Sequence[Case]], list[dict[str, Any]]]
 """Runs a policy and gives something JSON-able for each case; a function of a module that workers can import."""
 Cell = tuple[Policy, Plan]
 """A policy, and what it is run on."""
+Share = tuple[Policy, Plan, list[Case]]
+"""A policy, and some of the cases of what it is run on."""
 
 
 def beside_folder(out: Path) -> Path:
@@ -74,38 +76,45 @@ class KeptShares:
         self.path.unlink(missing_ok=True)
 
 
-def filled(
-    work: Work, cells: Sequence[Cell], kept: KeptShares, share_out: ShareOut, progress: Callable[[str, int], None]
-) -> list[list[dict[str, Any]]]:
-    """What the work gives for each cell, a list with an entry a case.
+class Planned:
+    """The shares of some cells, each once whatever number of cells it is in.
 
     Args:
         work: run on each share.
-        cells: the same one may stand several times; it is run once.
-        kept: shares that are done; further ones are added.
-        share_out: does the shares.
-        progress: called with the name of the policy and the number of cases of each share, those kept before included.
+        cells: policies, and what they are run on.
     """
-    parts = [[plan.cases[k : k + LARGEST_SHARE] for k in range(0, len(plan.cases), LARGEST_SHARE)] for _, plan in cells]
-    keys = [
-        [digest(work, one, plan, part) for part in mine] for (one, plan), mine in zip(cells, parts, strict=True)
-    ]  # fmt: skip
-    left: dict[str, tuple[Policy, Plan, list[Case]]] = {}
-    for (one, plan), mine, names in zip(cells, parts, keys, strict=True):
-        for part, key in zip(mine, names, strict=True):
-            if key in kept.done or key in left:
-                progress(one.name, len(part))
-            else:
-                left[key] = (one, plan, part)
-    for (key, share), found in zip(left.items(), share_out(work, list(left.values())), strict=True):
-        kept.add(key, finite(found))
-        progress(share[0].name, len(share[2]))
-    return [[case for key in names for case in kept.done[key]] for names in keys]
 
+    def __init__(self, work: Work, cells: Sequence[Cell]) -> None:
+        self.work = work
+        self.shares: dict[str, Share] = {}
+        """By digest."""
+        self._of_cells: list[list[str]] = []
+        for one, plan in cells:
+            cases = plan.cases
+            shares = [(one, plan, cases[k : k + LARGEST_SHARE]) for k in range(0, len(cases), LARGEST_SHARE)]
+            keys = [digest(work, *share) for share in shares]
+            self.shares |= dict(zip(keys, shares, strict=True))
+            self._of_cells.append(keys)
 
-def cases_of_cells(cells: Sequence[Cell]) -> int:
-    """Number of cases of all cells, as `filled` tells them to `progress`."""
-    return sum(len(plan.cases) for _, plan in cells)
+    def count(self, known: Mapping[str, Any] | None = None) -> int:
+        """Number of cases of all shares, or of those that are known."""
+        return sum(len(cases) for key, (_, _, cases) in self.shares.items() if known is None or key in known)
+
+    def fill(
+        self, kept: KeptShares, share_out: ShareOut, progress: Callable[[str, int], None]
+    ) -> list[list[dict[str, Any]]]:
+        """What the work gives for each cell, a list with an entry a case.
+
+        Args:
+            kept: shares that are done; further ones are added.
+            share_out: does the shares.
+            progress: called for each share that was not known, with the name of the policy and the number of cases.
+        """
+        left = {key: share for key, share in self.shares.items() if key not in kept.done}
+        for (key, share), found in zip(left.items(), share_out(self.work, list(left.values())), strict=True):
+            kept.add(key, finite(found))
+            progress(share[0].name, len(share[2]))
+        return [[case for key in keys for case in kept.done[key]] for keys in self._of_cells]
 
 
 def digest(work: Work, one: Policy, plan: Plan, cases: Sequence[Case]) -> str:

@@ -14,7 +14,7 @@ def between(one: Population, other: Population, part: float) -> Population:
     Args:
         one: population with fields.
         other: population with the same fields, each with a distribution of the same kind.
-        part: of the way, from 0 to 1: numbers are (1 - part) a + part b, limits of log-uniform ones a^(1 - part) b^part.
+        part: of the way, from 0 to 1: numbers are (1 - part) a + part b, log-uniform limits a^(1 - part) b^part.
 
     Raises:
         InputError: the two have other fields or other kinds of distributions, or `part` is outside its range.
