@@ -83,8 +83,8 @@ def adaptation(
         draw_panels(out / "adaptation.png", _panels(found, used), whom)
         forget(out)
     for name, one in found.items():
-        print(f"{name:20} windows until near the last level: {cell(one.windows)}, return of the last one: "
-              f"{cell(one.returns[-1])}, its regret: {cell(one.regrets[-1])}")  # fmt: skip
+        print(f"{name:20} windows to nine tenths of the last return: {cell(one.return_windows)}, return of "
+              f"the last: {cell(one.returns[-1])}, its regret: {cell(one.regrets[-1])}")  # fmt: skip
     print(f"written: {outputs.where(out)} (adaptation.csv, adaptation.md, adaptation.png)")
     return FAILED_RUN if outputs.failed else 0
 
@@ -120,11 +120,13 @@ def _text(found: Mapping[str, Adaptation], plan: Plan, tried: int, windows: int,
             texts = [name, *(cell(e) for e in getattr(one, kind))]
             lines.append(f"| {' | '.join(markdown_cell(x) for x in texts)} |")
         lines.append("")
-    lines += ["## Windows until the return is within a tenth of that of the last", "",
-              "| policy | windows | unsafe episodes |", "|---|---|---|"]  # fmt: skip
+    lines += ["## Windows that a policy needs", "",
+              "| policy | to nine tenths of the last return | until the regret has come nine tenths of its way to the "
+              "last | unsafe episodes |", "|---|---|---|---|"]  # fmt: skip
     for name, one in found.items():
-        lines.append(f"| {markdown_cell(name)} | {cell(one.windows)} | {cell(one.unsafe)} |")
-    return "\n".join([*lines, ""])
+        texts = [name, *(cell(e) for e in (one.return_windows, one.regret_windows, one.unsafe))]
+        lines.append(f"| {' | '.join(markdown_cell(x) for x in texts)} |")
+    return "\n".join([*lines, "", "![Return and regret over the windows](adaptation.png)", ""])
 
 
 def _panels(found: Mapping[str, Adaptation], policies: Sequence[Policy]) -> list[tuple[str, str, list[Curve]]]:

@@ -130,7 +130,7 @@ def _text(rows: Sequence[Row], plan: Plan, command: str) -> str:
                 cells_of = [f"{size:g}", one.name, *cells(found)]
                 lines.append(f"| {' | '.join(markdown_cell(x) for x in cells_of)} |")
         lines.append("")
-    return "\n".join(lines)
+    return "\n".join([*lines, "![Return over the size of each shift](shift.png)", ""])
 
 
 def _panels(rows: Sequence[Row], policies: Sequence[Policy]) -> list[tuple[str, str, list[Curve]]]:

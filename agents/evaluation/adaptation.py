@@ -8,18 +8,20 @@ The regret of a window is what the best of a set of policies reached in this win
 policy did; the best is picked with hindsight, for each patient and window anew. A policy of the set has no regret below
 0; one that is told the plan may have.
 
-The windows that a policy needs are counted up to the first one whose mean return is within a tenth of the last one's:
+The windows that a policy needs are counted up to the first one whose mean return R_k has nine tenths of the last one's,
+and, as fatigue takes return from everybody, once more up to the first one whose mean regret Q_k has come nine tenths of
+its way to the last one's:
 
-    min {k : R_k >= R_n - 0.1 |R_n|}
+    min {k : R_k >= R_n - 0.1 |R_n|}        min {k : Q_k <= Q_n + 0.1 |Q_1 - Q_n|}
 
-with the means R_k over the patients, which are resampled for the intervals.
+Means are over the patients, who are resampled for the intervals.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,7 +40,7 @@ from .statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, mean
 from .tuning import tunable
 
 NEAR = 0.1
-"""Part of the last level that may be lacking."""
+"""Part of a level, or of the way to it, that may be lacking."""
 
 
 def windows_of(environment: str) -> int:
@@ -116,14 +118,12 @@ class Adaptation:
     returns: list[Estimate]
     """Mean over the patients, a window each."""
     regrets: list[Estimate]
-    windows: Estimate
+    return_windows: Estimate
     """Windows until the return is near that of the last one."""
+    regret_windows: Estimate
+    """Windows until the regret is near that of the last one."""
     unsafe: Estimate
     """Share of the episodes that an event ended."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """The fields as a dict, for JSON."""
-        return asdict(self)
 
 
 def best_of(sets: Sequence[Sequence[Mapping[str, Any]]]) -> np.ndarray:
@@ -150,28 +150,35 @@ def adaptation(episodes: Sequence[Mapping[str, Any]], best: np.ndarray, seed: in
         return [estimate(x, mean, np.random.default_rng(seed)) for x in columns.T]
 
     return Adaptation(
-        each(returns), each(best - returns), windows_needed(returns, seed),
-        estimate(unsafe, mean, np.random.default_rng(seed)),
+        each(returns), each(best - returns), _needed(returns, near_return, seed),
+        _needed(best - returns, near_regret, seed), estimate(unsafe, mean, np.random.default_rng(seed)),
     )  # fmt: skip
 
 
-def windows_needed(returns: np.ndarray, seed: int) -> Estimate:
-    """Windows until the mean return is near that of the last one, with its interval.
+def _needed(values: np.ndarray, near: Callable[[np.ndarray], np.ndarray], seed: int) -> Estimate:
+    """Windows until the mean is near that of the last one, with its interval.
 
     Args:
-        returns: shape (patients, windows).
+        values: of each patient and window, shape (patients, windows).
+        near: `near_return` or `near_regret`.
         seed: of the bootstrap.
     """
-    n, tail = len(returns), 0.5 * (1.0 - CONFIDENCE)
+    n, tail = len(values), 0.5 * (1.0 - CONFIDENCE)
     places = np.random.default_rng(seed).integers(n, size=(RESAMPLES, n))
-    low, high = np.quantile(first_near(returns[places].mean(axis=1)), (tail, 1.0 - tail))
-    return Estimate(float(first_near(returns.mean(axis=0)[None])[0]), float(low), float(high), n)
+    low, high = np.quantile(near(values[places].mean(axis=1)), (tail, 1.0 - tail))
+    return Estimate(float(near(values.mean(axis=0)[None])[0]), float(low), float(high), n)
 
 
-def first_near(levels: np.ndarray) -> np.ndarray:
-    """The first window, from 1, that is within a tenth of the last; levels of shape (m, windows) give shape (m,)."""
+def near_return(levels: np.ndarray) -> np.ndarray:
+    """The first window, from 1, whose return is near the last one's; shape (m, windows) gives (m,)."""
     last = levels[:, -1:]
     return 1.0 + np.argmax(levels >= last - NEAR * np.abs(last), axis=1)
+
+
+def near_regret(levels: np.ndarray) -> np.ndarray:
+    """The first window, from 1, whose regret is near the last one's; shape (m, windows) gives (m,)."""
+    first, last = levels[:, :1], levels[:, -1:]
+    return 1.0 + np.argmax(levels <= last + NEAR * np.abs(first - last), axis=1)
 
 
 def _windows(episodes: Sequence[Mapping[str, Any]]) -> np.ndarray:

@@ -139,6 +139,6 @@ def _read(line: bytes) -> tuple[str, list[dict[str, Any]]] | None:
     """Digest and content of a line; None where it is not whole."""
     try:
         key, content = json.loads(line)
-    except (ValueError, RecursionError):
+    except (ValueError, TypeError, RecursionError):
         return None
     return (key, content) if isinstance(key, str) and isinstance(content, list) else None

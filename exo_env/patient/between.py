@@ -17,16 +17,20 @@ def between(one: Population, other: Population, part: float) -> Population:
         part: of the way, from 0 to 1: numbers are (1 - part) a + part b, log-uniform limits a^(1 - part) b^part.
 
     Raises:
-        InputError: the two have other fields or other kinds of distributions, or `part` is outside its range.
+        InputError: the two are no populations with the same fields and kinds of distributions, or `part` is outside its
+            range.
     """
     if not 0.0 <= part <= 1.0:
         raise InputError(f"part = {part}: expected a number from 0 to 1.")
     for end, share in ((one, 0.0), (other, 1.0)):
         if part == share:
             return end
+    for end in (one, other):
+        if end.mixture:
+            raise InputError(f"'{end.title}' is a mixture; expected a population with fields.")
     first, second = one.fields_in_full, other.fields_in_full
     if first.keys() != second.keys():
-        names = ", ".join(sorted(first.keys() ^ second.keys())) or "none, since they are mixtures"
+        names = ", ".join(sorted(first.keys() ^ second.keys()))
         raise InputError(f"'{one.title}' and '{other.title}' do not have the same fields; only one has {names}.")
     fields = {name: _between(name, first[name], second[name], part) for name in first}
     return Population(title=f"{part:.3g} of the way from {one.title} to {other.title}", fields=fields)

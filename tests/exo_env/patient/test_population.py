@@ -140,6 +140,28 @@ def test_evaluation_is_wider_and_shifted():
             assert WORSE[field] * (np.mean([d.quantile(x) for x in P]) - trained) > 0.0, field
 
 
+def test_shifted_is_further_than_evaluation_by_its_rule():
+    mixed, near, far = (Population.shipped(name) for name in ("mixed", "evaluation", "shifted"))
+    assert far.distributions.keys() == near.distributions.keys()
+    for field, d in far.distributions.items():
+        if field == "sex":
+            continue
+        low, high = near.distributions[field].limits()
+        assert d.limits()[0] <= low and high <= d.limits()[-1], field
+        parts = np.array([[p.distributions[field].quantile(x) for x in P] for p in mixed.parts])
+        weights = np.array(list(mixed.mixture.values())) / sum(mixed.mixture.values())
+        mean = weights @ parts.mean(axis=1)
+        deviation = np.sqrt(weights @ (parts**2).mean(axis=1) - mean**2)
+        if hasattr(d, "normal"):
+            # Numbers of the file have two digits, a twentieth at most; 400 quantiles leave out the ends.
+            side = np.sign(near.distributions[field].normal.mean - mean)
+            wanted = mean + side * deviation
+            assert d.normal.mean == pytest.approx(wanted, abs=0.05 * wanted + 0.01 * deviation), field
+            assert d.normal.deviation == pytest.approx(1.5 * deviation, rel=0.06), field
+        else:
+            assert d.limits() in ((low, 2.0 * high), (0.5 * low, high)), field
+
+
 def test_body_mass_follows_height():
     fixed = {"base": "healthy", "fields": {"body_mass_index": 25.0}}
     for seed in range(5):
@@ -217,7 +239,7 @@ def test_mistakes_name_file_key_and_value(tmp_path, text, words):
 
 @pytest.mark.parametrize("source", ["nobody", 3, None, ["healthy"]])
 def test_unknown_population_lists_the_shipped(source):
-    with pytest.raises(InputError, match="evaluation, healthy, mixed, stroke_mild, stroke_severe"):
+    with pytest.raises(InputError, match="evaluation, healthy, mixed, shifted, stroke_mild"):
         population(source)
 
 
