@@ -12,6 +12,7 @@ python -m agents shift --policy NAME [NAME ...] --out DIR [--shifts NAME ...] [-
 python -m agents adaptation --policy NAME [NAME ...] --out DIR [--patients N] [--tries N] [--workers N]
 python -m agents upper-bound --out FILE.csv
 python -m agents hindsight --out FILE.csv [--patients N] [--tries N] [--workers N]
+python -m agents picture --policy A B --patient NAME --seed S --out FILE.png
 python -m agents video --policy A B --patient NAME --out FILE.mp4
 
 A command renews a folder that it wrote; a file that exists, or a folder of others, it replaces with --overwrite only.
@@ -29,6 +30,7 @@ from .commands.adaptation import adaptation
 from .commands.evaluate import evaluate, policies
 from .commands.export import export
 from .commands.hindsight import hindsight
+from .commands.picture import picture
 from .commands.report import report
 from .commands.shift import shift
 from .commands.sweep import sweep
@@ -55,6 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
             "tune-baselines": tune_baselines,
             "upper-bound": upper_bound,
             "hindsight": hindsight,
+            "picture": picture,
             "video": video,
         },
         PROGRAM,

@@ -48,8 +48,9 @@ def gap_lines(results: Mapping[str, Any]) -> list[str]:
         if gap["reason"]:
             reasons.setdefault(gap["reason"], []).append(name)
     said = "; ".join(f"from {a} to {b} for {', '.join(names)}" for (a, b), names in between.items())
+    told = ", ".join(name for name, p in results["policies"].items() if p.get("informed"))
     return [
-        f"Gap closed: {said}. Opponent and oracle were chosen on training patients.",
+        f"Gap closed: {said}. Opponent and oracle were chosen on training patients. Told the plan: {told or 'nobody'}.",
         *(f"No gap for {', '.join(names)}: {reason}." for reason, names in reasons.items()),
     ]
 

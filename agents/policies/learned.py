@@ -85,7 +85,9 @@ class Description(Settings):
     architecture: Architecture
     steps: Count = Field(description="of training")
     seed: Count | None = None
-    informed: bool = Field(default=False, strict=True, description="may see what reveals the patient's plan")
+    informed: bool = Field(
+        default=False, strict=True, description="it learned with groups that reveal the patient's plan"
+    )
     weights_sha256: str = ""
     sha256: str = Field(default="", description="of all other keys")
 
@@ -113,6 +115,7 @@ def world_facts(env: gymnasium.Env) -> dict[str, Any]:
         "structure": tuple(parts),
         "period": world.period,
         "drive": world.drive.model_dump(mode="json"),
+        "informed": any(part.group in world.task.revealing for part in world.observation_structure),
     }
 
 

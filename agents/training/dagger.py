@@ -97,7 +97,7 @@ class Dagger(OnPolicyAlgorithm):
         callback.on_rollout_start()
         taught = _taught(env)
         left = 1.0 - self.num_timesteps / self.imitation.driven if self.imitation.driven else 0.0
-        taught.driven[:] = np.arange(self.n_envs) < round(max(left, 0.0) * self.n_envs)
+        driven = np.arange(self.n_envs)[:, None] < round(max(left, 0.0) * self.n_envs)
         seen: Any = env.reset()
         rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         over, state = np.zeros(self.n_envs, bool), None
@@ -105,7 +105,10 @@ class Dagger(OnPolicyAlgorithm):
             rows.append((self._as_shown(seen), taught.advice, ~over))
             with torch.no_grad():
                 actions, state = self.acting(torch.as_tensor(seen, device=self.device)[None], state)
-            seen, _, ended, infos = env.step(np.clip(actions[0].cpu().numpy(), -1.0, 1.0))
+            driving = np.where(driven, taught.advice, actions[0].cpu().numpy())
+            if self.imitation.noise:
+                driving = driving + self.imitation.noise * torch.randn(driving.shape).numpy()
+            seen, _, ended, infos = env.step(np.clip(driving, -1.0, 1.0))
             self.num_timesteps += self.n_envs
             if not callback.on_step():
                 return False

@@ -27,6 +27,11 @@ class Imitation(Settings):
         default=100_000, ge=0, le=MOST_STEPS,
         description="steps over which the share of worlds that the teacher drives falls from 1 to 0",
     )  # fmt: skip
+    noise: float = Field(
+        default=0.0, ge=0.0, le=1.0,
+        description="standard deviation of what is added to the actions that drive the worlds, so that the student "
+        "comes to know the states that noise leads to, that of reinforcement learning afterwards too",
+    )  # fmt: skip
     kept: int = Field(default=8, ge=1, le=1000, description="rounds that are learned from, the last ones")
     segment: int = Field(
         default=150, ge=1, le=1_000_000, description="decisions over which an error is followed back in time"

@@ -1,4 +1,4 @@
-"""Worlds in which a teacher looks on: it says after each observation what it would do, and may drive some of them."""
+"""Worlds in which a teacher looks on: it says after each observation what it would do."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from ..teacher import Teacher
 class Taught(VecEnvWrapper):
     """Worlds that show what the student sees.
 
-    `advice`, shape (n, actions), is what the teacher would do now. Where `driven`, shape (n,), is true the teacher's
-    advice is done, and not the action given. The teacher begins anew with `reset` alone: behind an episode's end within
-    a world its advice means nothing.
+    `advice`, shape (n, actions), is what the teacher would do now. The teacher begins anew with `reset` alone: behind
+    the end of an episode its advice means nothing.
 
     Args:
         worlds: that show what `teacher.observation` names.
@@ -29,7 +28,6 @@ class Taught(VecEnvWrapper):
         self._teacher, places = teacher, teacher.student_places
         low, high = single.low[places], single.high[places]
         super().__init__(worlds, observation_space=spaces.Box(low, high, dtype=single.dtype))
-        self.driven = np.zeros(worlds.num_envs, bool)
 
     def reset(self) -> np.ndarray:
         """First observations; the teacher begins anew."""
@@ -37,10 +35,6 @@ class Taught(VecEnvWrapper):
         assert isinstance(seen, np.ndarray)
         self._teacher.begin(self.num_envs)
         return self._advised(seen)
-
-    def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions, the teacher's where it drives."""
-        self.venv.step_async(np.where(self.driven[:, None], self.advice, actions))
 
     def step_wait(self) -> VecEnvStepReturn:
         """A control period."""

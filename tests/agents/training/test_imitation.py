@@ -72,7 +72,6 @@ def test_the_teacher_sees_its_own_and_the_student_no_more_than_its_own(teacher, 
     worlds = wrapped(config, 3)
     taught = worlds.venv
     assert worlds.observation_space.shape == (2,)
-    taught.driven[:] = True
     worlds.reset()
     env, policy = make(ENVIRONMENT, **WIDE), find_policy(str(teacher))
     seen, info = env.reset(seed=3)
@@ -81,7 +80,7 @@ def test_the_teacher_sees_its_own_and_the_student_no_more_than_its_own(teacher, 
         wanted = policy(seen, info)
         np.testing.assert_allclose(taught.advice[0], wanted, atol=1e-6)  # single precision
         np.testing.assert_array_equal(worlds.get_original_obs()[0], seen[:2])
-        worlds.step(np.zeros((2, 2)))
+        worlds.step(np.tile(wanted, (2, 1)))
         seen, _, _, _, info = env.step(wanted)
     worlds.close()
 
