@@ -19,11 +19,12 @@ from dms_core.files.outputs import Outputs
 from ..distributed.variations import folder_of, read_variations
 from ..environment import PROGRAM
 from ..evaluation.evaluate import Plan
+from ..evaluation.kept_shares import forget
 from ..evaluation.key_figures import FIGURES, HEADS, MEANS, cells, columns, key_figures, measured_episodes
 from ..evaluation.opponents import opponent_of, oracle_name, with_opponents
 from ..policies.learned import find_policy
 from ..policies.policy import Policy
-from .kept_cells import forget, run_cells
+from .kept_cells import run_cells
 from .options import check_hides_plan
 
 USUAL = "exo/HiddenIntent-v0"

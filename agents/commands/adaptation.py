@@ -22,12 +22,13 @@ from ..environment import PROGRAM
 from ..evaluation.adaptation import Adaptation, best_of, hindsight_set, window_returns, windows_of
 from ..evaluation.adaptation import adaptation as adapted
 from ..evaluation.evaluate import Plan
+from ..evaluation.kept_shares import forget
 from ..evaluation.line_figures import Curve, draw_panels, line_titles
 from ..evaluation.opponents import with_opponents
 from ..evaluation.tables import cell
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
-from .kept_cells import forget, run_cells
+from .kept_cells import run_cells
 from .options import check_hides_plan, different_policies
 
 USUAL = "exo/NewPatient-v0"

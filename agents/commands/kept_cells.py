@@ -18,7 +18,7 @@ from .options import sharing_out
 def run_cells(
     work: Work, cells: Sequence[Cell], out: Path, workers: int, address: str | None
 ) -> list[list[dict[str, Any]]]:
-    """What the work gives for each cell; what is done is kept beside the folder `out` until `forget` is called.
+    """What the work gives for each cell; what is done is kept beside the folder `out` until it is forgotten.
 
     Args:
         work: run on each share of a cell.
@@ -51,8 +51,3 @@ def run_cells(
             raise
         said = f"{done} of {total} episodes are in '{kept.path}'; the same command goes on from there."
         raise Stopped(said) from None
-
-
-def forget(out: Path) -> None:
-    """Remove the kept shares, whose results stand in the folder `out` now."""
-    beside_folder(out).unlink(missing_ok=True)

@@ -19,17 +19,18 @@ from exo_env.rendering.panels import require_matplotlib
 
 from ..environment import PROGRAM
 from ..evaluation.evaluate import Plan
-from ..evaluation.kept_shares import Cell
+from ..evaluation.kept_shares import Cell, forget
 from ..evaluation.key_figures import FIGURES, HEADS, MEANS, cells, columns, key_figures, measured_episodes
 from ..evaluation.line_figures import Curve, draw_panels, line_titles
 from ..evaluation.opponents import opponent_of, oracle_name, with_opponents
 from ..evaluation.shift import SHIFTS
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
-from .kept_cells import forget, run_cells
+from .kept_cells import run_cells
 from .options import check_hides_plan, different_policies
 
 USUAL = "exo/HiddenIntent-v0"
+FAULTS = "Faults of sensors reach the policies that read these sensors; to others it is the same episode again."
 Row = tuple[str, float, Policy, dict[str, dict[str, Any]]]
 """Shift, size, policy and its figures."""
 
@@ -84,7 +85,9 @@ def shift(
         rows = _rows(keys, episodes, plan)
         write_text(out / "shift.csv", _numbers(rows, patients, command))
         write_text(out / "shift.md", _text(rows, plan, command))
-        draw_panels(out / "shift.png", _panels(rows, used), f"{counted(patients, 'patient')} of '{plan.title}'")
+        draw_panels(
+            out / "shift.png", _panels(rows, used), f"{counted(patients, 'patient')} of '{plan.title}'", [FAULTS]
+        )
         forget(out)
     print(f"written: {outputs.where(out)} (shift.csv, shift.md, shift.png)")
     return FAILED_RUN if outputs.failed else 0
@@ -120,7 +123,7 @@ def _text(rows: Sequence[Row], plan: Plan, command: str) -> str:
     """Markdown with a table a shift."""
     lines = [
         "# Shifts away from training", "", printable(f"{counted(plan.patients, 'patient')} of '{plan.title}', seed "
-        f"{plan.seed}, in {plan.id}. {MEANS}"), "", f"`{printable(command)}`", "",
+        f"{plan.seed}, in {plan.id}. {MEANS} {FAULTS}"), "", f"`{printable(command)}`", "",
     ]  # fmt: skip
     for name in dict.fromkeys(row[0] for row in rows):
         heads = ["size", "policy", *(HEADS[figure] for figure in FIGURES)]

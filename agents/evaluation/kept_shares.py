@@ -40,6 +40,11 @@ def beside_folder(out: Path) -> Path:
     return place.with_name(f"{place.name}.partial.jsonl")
 
 
+def forget(out: Path) -> None:
+    """Remove the kept shares, whose results stand in the folder `out` now."""
+    beside_folder(out).unlink(missing_ok=True)
+
+
 class KeptShares:
     """Shares that are done, by their digest.
 
@@ -70,10 +75,6 @@ class KeptShares:
             file.write(_line(key, content))
             file.flush()
             os.fsync(file.fileno())
-
-    def remove(self) -> None:
-        """Remove the file, whose shares stand elsewhere now."""
-        self.path.unlink(missing_ok=True)
 
 
 class Planned:
