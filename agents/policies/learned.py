@@ -85,9 +85,7 @@ class Description(Settings):
     architecture: Architecture
     steps: Count = Field(description="of training")
     seed: Count | None = None
-    informed: bool = Field(
-        default=False, strict=True, description="it learned with groups that reveal the patient's plan"
-    )
+    informed: bool = Field(default=False, strict=True, description="saw what reveals the patient's plan")
     weights_sha256: str = ""
     sha256: str = Field(default="", description="of all other keys")
 

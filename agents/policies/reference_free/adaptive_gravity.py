@@ -14,11 +14,11 @@ from typing import ClassVar
 import numpy as np
 
 from ..tuned import Range
-from .assist_moment import HEAVIEST, SHARE, SMOOTHING, AssistMoment, Seen
+from .assist_moment import SHARE, SMOOTHING, USUAL_LOAD, AssistMoment, Seen
 from .known import at
 
-MOST_SHARE = 3.0
-"""Largest share of the arm that is learned [-]."""
+MOST_SHARE, HEAVIEST = 3.0, 5.0
+"""Largest share of the arm [-] and largest load [kg] that are learned."""
 
 
 class AdaptiveGravity(AssistMoment):
@@ -43,8 +43,8 @@ class AdaptiveGravity(AssistMoment):
 
     def start(self, observations: np.ndarray, seen: Seen) -> None:
         """The weights begin with what the ropes hold."""
-        arm = np.broadcast_to(np.asarray(self.numbers["share"], float), seen.angle.shape)
-        self._weights, self._slow = np.array([arm, self.load]), seen.angle.copy()
+        self._weights = np.array([self.numbers["share"] + self.hanging, USUAL_LOAD * self.hanging])
+        self._slow = seen.angle.copy()
 
     def wanted(self, observations: np.ndarray, seen: Seen) -> np.ndarray:
         """The moment of the weights, which learn from the present error."""

@@ -23,10 +23,12 @@ SMOOTHING = Range(0.01, 0.4, True)
 DAMPING = Range(-1.5, 4.0)
 SHARE = Range(0.0, 1.5)
 CARRIED = Range(0.0, 1.2)
-HEAVIEST = 5.0
-"""Largest load that is believed [kg]."""
-LEAST_LEVER = 0.5
-"""Least moment of a kilogram by which a load is estimated [Nm]; nearer to the straight arm the rope has no leverage."""
+USUAL_LOAD = 1.25
+"""Load of a usual weight [kg]: the mean of those that are drawn."""
+MOST_CARRIED = 2.0
+"""Largest part of a usual weight that is believed to hang in the ropes [-]."""
+LEAST_MOMENT = 0.5
+"""Least moment of a usual weight by which a part of it is told [Nm]; the straight arm has none."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class AssistMoment(BatchPolicy):
 
     smoothing   time constant of the low-pass filter of the moment [s]
     share       of the moment that holds arm and lower link, which is given all the time [-]
-    carried     share of the load's moment, as it is estimated from what the ropes hold at the start [-]
+    carried     share of what the ropes hold of the weight beyond that, as they do at the start [-]
     damping     moment against the rate [N m s/rad]; a negative one helps whatever moves, as against friction
     """
 
@@ -60,8 +62,8 @@ class AssistMoment(BatchPolicy):
     channels: Channels
     moment: np.ndarray | None
     """The filtered moment [Nm], shape (n,); None until the first observation."""
-    load: np.ndarray
-    """Load that is estimated at the start [kg], shape (n,)."""
+    hanging: np.ndarray
+    """Part of a usual weight that hangs in the ropes, as they tell at the start [-], shape (n,)."""
     _known_env: object = None
 
     def begin(self, env: gymnasium.Env | VectorEnv, n: int) -> None:
@@ -84,7 +86,7 @@ class AssistMoment(BatchPolicy):
         seen = self._seen(observations)
         if self.moment is None:
             self.moment = seen.held.copy()
-            self.load = self._load_at_start(seen)
+            self.hanging = self.part_of(seen)
             self.start(observations, seen)
         self.moment = self.moment + self.kept(self.numbers["smoothing"]) * (
             self.wanted(observations, seen) - self.moment
@@ -96,24 +98,22 @@ class AssistMoment(BatchPolicy):
         return 1.0 - np.exp(-self.period / np.asarray(time_constant))
 
     def weight(self, angle: np.ndarray) -> np.ndarray:
-        """Moment for the share of arm and lower link, and for what is carried of the load [Nm]."""
+        """Moment for the share of arm and lower link, and for what is carried of the weight beyond that [Nm]."""
         given = self.numbers
-        return given["share"] * at(self.known.own, angle) + given["carried"] * self.load * at(
-            self.known.kilogram, angle
-        )
+        return given["share"] * at(self.known.own, angle) + given["carried"] * self.hanging * self.usual(angle)
+
+    def usual(self, angle: np.ndarray) -> np.ndarray:
+        """Moment that holds arm, lower link and a usual load [Nm]."""
+        return at(self.known.own, angle) + USUAL_LOAD * at(self.known.kilogram, angle)
+
+    def part_of(self, seen: Seen) -> np.ndarray:
+        """Part of a usual weight that hangs in the ropes beyond the share of arm and link [-], 0 to MOST_CARRIED."""
+        beyond = seen.held - self.numbers.get("share", 0.0) * at(self.known.own, seen.angle)
+        return np.clip(beyond / np.maximum(self.usual(seen.angle), LEAST_MOMENT), 0.0, MOST_CARRIED)
 
     def link(self, angle: np.ndarray) -> np.ndarray:
         """Moment that holds the device's own lower link [Nm]."""
         return at(self.known.link, angle)
-
-    def load_of(self, moment: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Load that has a moment at an angle [kg], from 0 to HEAVIEST."""
-        return np.clip(moment / np.maximum(at(self.known.kilogram, angle), LEAST_LEVER), 0.0, HEAVIEST)
-
-    def _load_at_start(self, seen: Seen) -> np.ndarray:
-        """Load whose moment, with the share of arm and link, is what the ropes hold at the start [kg]."""
-        rest = seen.held - self.numbers.get("share", 1.0) * at(self.known.own, seen.angle)
-        return self.load_of(rest, seen.angle)
 
     def _seen(self, observations: np.ndarray) -> Seen:
         columns = self.channels.columns

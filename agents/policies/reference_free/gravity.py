@@ -1,10 +1,10 @@
 """Compensation of gravity: what most arm supports do.
 
-    M = share own(theta) + carried m kilogram(theta) - damping rate
+    M = share own(theta) + carried part usual(theta) - damping rate
 
-with the moments of an average man's arm with the device's link, and of a kilogram (known.py). `Gravity` has no load;
-`GravityLoad` estimates m where the arm rests, as the load whose moment the ropes hold there: what the patient holds
-himself counts as no load.
+with the moments of an average man's arm with the device's link, and of the same with a usual load (known.py). `Gravity`
+has no second part; `GravityLoad` estimates `part` where the arm rests, from what the ropes hold there: what the patient
+holds himself is no load of theirs.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class GravityLoad(AssistMoment):
 
     Args:
         share: see `AssistMoment`.
-        carried: share of the load's moment [-].
+        carried: share of what hangs in the ropes beyond that [-].
         still: rate below which the arm counts as at rest [rad/s].
         memory: time constant of the estimate at rest [s].
         damping: see `AssistMoment`.
@@ -56,7 +56,6 @@ class GravityLoad(AssistMoment):
     def wanted(self, observations: np.ndarray, seen: Seen) -> np.ndarray:
         """The moments of arm and estimated load."""
         x = self.numbers
-        found = self.load_of(seen.held - x["share"] * at(self.known.own, seen.angle), seen.angle)
         rests = np.abs(seen.rate) < x["still"]
-        self.load = self.load + rests * self.kept(x["memory"]) * (found - self.load)
+        self.hanging = self.hanging + rests * self.kept(x["memory"]) * (self.part_of(seen) - self.hanging)
         return self.weight(seen.angle) - x["damping"] * seen.rate

@@ -120,20 +120,28 @@ def test_gravity_is_what_the_table_says():
     np.testing.assert_allclose(used.wanted(observations, seen), 1.2 * at(used.known.own, seen.angle))
 
 
-def test_an_estimated_load_is_the_one_that_the_ropes_hold():
-    used = middle(GravityLoad, share=1.0, carried=1.0, memory=0.1, damping=0.0, still=0.5)
+def test_an_estimated_load_is_what_hangs_in_the_ropes():
+    used = middle(GravityLoad, share=0.2, carried=1.0, memory=0.1, damping=0.0, still=0.5)
     _, observations = begun(used)
     used.act(observations)
     angle = np.radians([60.0])
-    held = at(used.known.own, angle) + 1.7 * at(used.known.kilogram, angle)
+    held = 0.2 * at(used.known.own, angle) + 0.7 * used.usual(angle)
     for _ in range(100):
         moment = used.wanted(observations, Seen(angle, np.zeros(1), held))
     # 2 s are twenty time constants.
-    np.testing.assert_allclose(used.load, 1.7, rtol=1e-6)
+    np.testing.assert_allclose(used.hanging, 0.7, rtol=1e-6)
     np.testing.assert_allclose(moment, held, rtol=1e-6)
     # An arm that moves tells nothing.
     used.wanted(observations, Seen(angle, np.ones(1), 0.0 * held))
-    np.testing.assert_allclose(used.load, 1.7, rtol=1e-6)
+    np.testing.assert_allclose(used.hanging, 0.7, rtol=1e-6)
+
+
+def test_what_the_ropes_hold_at_the_start_goes_on_without_a_jump():
+    used = middle(MeanAngle, share=0.0, carried=1.0, stiffness=0.3, damping=0.05)
+    _, observations = begun(used)
+    used.act(observations)
+    seen = used._seen(observations)
+    np.testing.assert_allclose(used.weight(seen.angle), np.clip(seen.held, 0.0, None), rtol=1e-6)
 
 
 def test_emg_is_amplified_beyond_the_dead_zone():
