@@ -13,16 +13,16 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
-from dms_core.errors import InputError, Stopped, counted, printable
+from dms_core.errors import Stopped, counted, printable
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs
 
-from ..environment import PROGRAM, hides_plan
+from ..environment import PROGRAM
 from ..evaluation.hindsight import hindsight as tried
 from ..evaluation.hindsight import summed_up, tuned_difference
 from ..evaluation.tries import KeptTries, Try, beside
 from ..evaluation.tuning import tunable
-from .options import sharing_out
+from .options import check_hides_plan, sharing_out
 
 USUAL = "exo/HiddenIntent-v0"
 CLOCK, ANGLE = "mean_clock", "mean_angle"
@@ -55,8 +55,7 @@ def hindsight(
         environment: in which, by id; one whose task hides the patient's plan.
         overwrite: replace a file of this name.
     """
-    if not hides_plan(environment):
-        raise InputError(f"--env {environment}: expected one whose task hides the patient's plan, such as {USUAL}.")
+    check_hides_plan(environment, USUAL)
     command = f"{PROGRAM} hindsight --population {shlex.quote(population)} --patients {patients} --tries {tries}"
     command += f" --seed {seed} --env {environment}"
     done: dict[str, list[Try]] = {}

@@ -12,6 +12,7 @@ from dms_core.files.json_text import brief, parse_json
 
 from ..checkpoint import Store
 from ..distributed.cluster import connected
+from ..environment import hides_plan
 from ..evaluation.shares import ShareOut, processes
 from ..policies.learned import DESCRIPTION, SHIPPED, LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from ..policies.policy import Policy
@@ -39,6 +40,20 @@ def _identity(name: str, one: Policy) -> Any:
         return type(one)
     folder = SHIPPED / name if name in shipped_policies() else Path(name)
     return (folder if (folder / DESCRIPTION).is_file() else Store(folder / "best").latest()).resolve()
+
+
+def check_hides_plan(environment: str, usual: str) -> None:
+    """Refuse an environment whose task hides nothing.
+
+    Args:
+        environment: its id.
+        usual: id of one that would be right.
+
+    Raises:
+        InputError: names the option.
+    """
+    if not hides_plan(environment):
+        raise InputError(f"--env {environment}: expected one whose task hides the patient's plan, such as {usual}.")
 
 
 @contextlib.contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -34,6 +34,26 @@ def batch_returns(
         environment: its id.
         settings: further ones of the environment.
     """
+    returns, unsafe = (np.zeros((len(rows), len(seeds)), x) for x in (float, bool))
+    for rewards, ended in batch_steps(kind, rows, seeds, patients_of, environment, settings):
+        returns += rewards
+        unsafe |= ended
+    return returns, unsafe
+
+
+def batch_steps(
+    kind: type[BatchPolicy],
+    rows: Sequence[Mapping[str, float]],
+    seeds: Sequence[int],
+    patients_of: Source,
+    environment: str,
+    settings: Mapping[str, Any],
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The steps of the episodes of `batch_returns`.
+
+    Yields:
+        Reward of each episode, 0 where it is over, and whether an event ends it now; shape (rows, seeds) each.
+    """
     tries, patients = len(rows), len(seeds)
     worlds = _worlds(
         environment, tries * patients, kind.action_mode, kind.observation,
@@ -42,14 +62,12 @@ def batch_returns(
     acting = kind(**{name: np.repeat([float(row[name]) for row in rows], patients) for name in kind.ranges})
     observations, _ = worlds.reset(seed=[*seeds] * tries)
     acting.begin(worlds, worlds.num_envs)
-    returns, unsafe, running = (np.zeros(worlds.num_envs, x) for x in (float, bool, bool))
-    running[:] = True
+    running = np.ones(worlds.num_envs, dtype=bool)
     while running.any():
         observations, rewards, terminated, truncated, _ = worlds.step(acting.act(observations))
-        returns += np.where(running, rewards, 0.0)
-        unsafe |= running & terminated
+        now, ended = np.where(running, rewards, 0.0), running & terminated
+        yield now.reshape(tries, patients), ended.reshape(tries, patients)
         running &= ~(terminated | truncated)
-    return returns.reshape(tries, patients), unsafe.reshape(tries, patients)
 
 
 @lru_cache(maxsize=1)

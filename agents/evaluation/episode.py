@@ -55,6 +55,21 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
         "measures", "event", which ended it or None, what `info` of the reset says of patient, load and movement, and
         "left_out", the measures that the environment does not allow.
     """
+    drawn, record = recorded(env, acting, seed, load)
+    return {
+        **{k: drawn[k] for k in ABOUT if k in drawn},
+        "event": record.event,
+        "measures": measured(record),
+        "left_out": left_out(record),
+    }
+
+
+def recorded(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> tuple[dict[str, Any], Record]:
+    """Run one episode; arguments as of `episode`.
+
+    Returns:
+        `info` of the reset, and the episode's record.
+    """
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
     info = drawn
@@ -68,12 +83,7 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
         record.add(world.readings())
         over = terminated or truncated
     record.event = info.get("event")
-    return {
-        **{k: drawn[k] for k in ABOUT if k in drawn},
-        "event": record.event,
-        "measures": measured(record),
-        "left_out": left_out(record),
-    }
+    return drawn, record
 
 
 def judged(env: gymnasium.Env, acting: Policy, seeds: Sequence[int]) -> list[dict[str, Any]]:

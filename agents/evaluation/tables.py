@@ -71,11 +71,11 @@ def short_table(results: Mapping[str, Any]) -> str:
     gap = ["gap closed"] * _with_gap(results["policies"])
     rows = [["", "return", f"difference to {names[0]}", *gap, *shown.values(), "unsafe"]]
     for name, p in zip(names, policies, strict=True):
-        returned, *others = (_cell(Estimate(**p["summary"][k])) for k in ("return", *shown))
-        compared = "" if name == names[0] else _cell(Estimate(**p["difference"]["return"]))
+        returned, *others = (cell(Estimate(**p["summary"][k])) for k in ("return", *shown))
+        compared = "" if name == names[0] else cell(Estimate(**p["difference"]["return"]))
         # A percentage would round a single one away.
         unsafe = f"{sum(e['measures']['unsafe'] for e in p['episodes']):.0f} of {len(p['episodes'])}"
-        closed = [_gap_cell(p["summary"])] if gap else []
+        closed = [gap_cell(p["summary"])] if gap else []
         rows.append([name, returned, compared, *closed, *others, unsafe])
     if len(policies) == 1:
         rows = [[*row[:2], *row[3:]] for row in rows]
@@ -129,9 +129,9 @@ def _rows(policies: Mapping[str, Any], summary: str, measures: Sequence[str]) ->
     for m in measures_among(measures):
         if all(m.name in p[summary] for p in policies.values()):
             label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
-            rows.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in policies.values())])
+            rows.append([label, *(cell(Estimate(**p[summary][m.name])) for p in policies.values())])
         if m.name == "return" and summary != "d" and _with_gap(policies):
-            rows.append(["gap closed", *(_gap_cell(p[summary]) for p in policies.values())])
+            rows.append(["gap closed", *(gap_cell(p[summary]) for p in policies.values())])
     return rows
 
 
@@ -140,12 +140,12 @@ def _with_gap(policies: Mapping[str, Any]) -> bool:
     return any(GAP in p["summary"] for p in policies.values())
 
 
-def _gap_cell(summary: Mapping[str, Any]) -> str:
+def gap_cell(summary: Mapping[str, Any]) -> str:
     """The gap closed, or a dash where there is none."""
     gap = summary.get(GAP)
     if gap is None or gap["reason"]:
         return "-"
-    return _cell(Estimate(gap["value"], gap["low"], gap["high"], gap["count"]))
+    return cell(Estimate(gap["value"], gap["low"], gap["high"], gap["count"]))
 
 
 def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
@@ -176,7 +176,7 @@ def best_baseline(policies: Mapping[str, Any]) -> str | None:
     return max(known, key=lambda name: policies[name]["summary"]["return"]["value"], default=None)
 
 
-def _cell(e: Estimate) -> str:
+def cell(e: Estimate) -> str:
     """Value and interval; what is below `LEAST` is round-off, and 0."""
     value, low, high = (0.0 if abs(x) < LEAST else x for x in (e.value, e.low, e.high))
     return f"{_digits(value)} [{_digits(low)}, {_digits(high)}]"
