@@ -16,8 +16,9 @@ from dms_core.files.outputs import Outputs
 from exo_env.patient.population import population, shipped_populations
 from exo_env.rendering.panels import require_matplotlib
 
-from ..environment import ENVIRONMENT, environment_id
+from ..environment import ENVIRONMENT, check_settings, environment_id
 from ..evaluation import report_figures
+from ..evaluation.patients_figure import time_courses
 from ..evaluation.tables import whole_table
 from ..evaluation.time_course import TimeCourse, time_course
 from ..policies.baselines import POLICIES
@@ -62,10 +63,10 @@ def report(
             lines += _trainings(out, trainings)
         for k, results in enumerate(evaluations):
             lines += _evaluation(out, results, "" if k == 0 else f"_{k + 1}")
-        shown = _shown(policy_names, evaluations, trainings)
+        place = used or _place(trainings, evaluations)
+        shown = _shown(policy_names, evaluations, trainings, place)
         if shown:
             settings = evaluations[0].get("settings", {}) if evaluations else repeated(shown, None)
-            place = used or _place(trainings, evaluations)
             settings = {**settings, **device_settings(exoskeleton), "environment": place}
             lines += _patients(out, shown, {f"mild: {mild}": mild, f"severe: {severe}": severe}, seed, settings)
         if shown and evaluations:
@@ -120,8 +121,10 @@ def _evaluation(out: Path, results: dict[str, Any], suffix: str) -> list[str]:
     return [*whole_table(results), f"![Tracking over the share of the device](pareto{suffix}.png)", ""]
 
 
-def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], trainings: Mapping[Path, Any]) -> list[Policy]:
-    """The two policies to show over time."""
+def _shown(
+    names: Sequence[str], evaluations: Sequence[dict[str, Any]], trainings: Mapping[Path, Any], place: str
+) -> list[Policy]:
+    """The two policies to show over time in the environment `place`."""
     if names:
         if len(names) != 2:
             raise InputError(f"--policies {' '.join(names)}: expected two different names.")
@@ -129,13 +132,22 @@ def _shown(names: Sequence[str], evaluations: Sequence[dict[str, Any]], training
     evaluated = evaluations[0]["policies"] if evaluations else {}
     ranked = sorted(evaluated, key=lambda n: evaluated[n]["summary"]["return"]["value"], reverse=True)
     learned = [n for n in ranked if n not in POLICIES] + [str(path) for path, curve in trainings.items() if curve]
-    baselines = [n for n in ranked if n in POLICIES] + ["pid", "none"]
+    baselines = [n for n in ranked if n in POLICIES and not POLICIES[n].informed] + ["pid", "none"]
     shown: list[Policy] = []
     for name in dict.fromkeys([*learned[:1], *baselines]):
         # The folder of a policy that was evaluated may be gone.
         if name in POLICIES or name in shipped_policies() or Path(name).is_dir():
             shown.append(find_policy(name))
-    return shown[:2]
+    return [policy for policy in shown if _fits(policy, place)][:2]
+
+
+def _fits(policy: Policy, place: str) -> bool:
+    """Whether an environment has a policy's actions and observations."""
+    try:
+        check_settings(place, {"action_mode": policy.action_mode, "observation": list(policy.observation)})
+    except InputError:
+        return False
+    return True
 
 
 def _patients(
@@ -143,7 +155,7 @@ def _patients(
 ) -> list[str]:
     """Figure of patients over time."""
     columns = {title: [time_course(p, source, seed, **settings) for p in shown] for title, source in whom.items()}
-    report_figures.time_courses(out / "patients.png", columns)
+    time_courses(out / "patients.png", columns)
     return ["## Patients over time", "", "![Two patients under two policies](patients.png)", ""]
 
 
@@ -158,7 +170,7 @@ def _worst(out: Path, shown: Sequence[Policy], results: Mapping[str, Any]) -> li
     why = "ended early" if m["unsafe"] else "largest error" if m.get("tracking_rms_deg") is not None else "least return"
     title = f"{why} of {counted(len(episodes), 'episode')} with {judged.title}"
     columns = {title: [_again(p, worst, results) for p in shown]}
-    report_figures.time_courses(out / "worst_patient.png", columns)
+    time_courses(out / "worst_patient.png", columns)
     sentence = worst["event"] or f"return {m['return']:.4g}"
     if not worst["event"] and m.get("tracking_rms_deg") is not None:
         sentence = f"tracking {m['tracking_rms_deg']:.3g} deg rms, {m['tracking_peak_deg']:.3g} deg at most"

@@ -15,14 +15,16 @@ from dms_core.files.output_place import check_folder
 
 from ..distributed.cluster import share_out
 from ..distributed.sweep import in_order, planned, steps_of, train_share
+from ..distributed.variations import read_variations
 from ..environment import PROGRAM
 from ..training.config import Config
 from ..training.usable import require_training
 
 
 def sweep(
-    configs: tuple[Path, ...],
     out: FolderOut,
+    configs: tuple[Path, ...] = (),
+    variations: Path | None = None,
     seeds: tuple[int, ...] = (0, 1, 2),
     changes: Annotated[tuple[str, ...], arg(name="set", metavar="KEY=VALUE ...")] = (),
     address: str | None = None,
@@ -34,8 +36,10 @@ def sweep(
     A training that learns from another of them (training.imitation.teacher, training.initial) waits for it.
 
     Args:
-        configs: YAML files in the format of rl_zoo3, as in configs/agents.
         out: folder of the trainings, one in each CONFIG_SEED; with a cluster, one that all its machines see.
+        configs: YAML files in the format of rl_zoo3, as in configs/agents.
+        variations: YAML file with a list of such files and of values that each variation changes, as in
+            configs/ablations; their folders are NAME_SEED.
         seeds: of the trainings.
         changes: values that replace those of all configurations, as for train.
         address: of a Ray cluster, or 'auto' for that of this machine; a local one is started where it is not given.
@@ -43,7 +47,8 @@ def sweep(
         environment: id of the section to take of each file, where it has several.
     """
     require_training()
-    groups = in_order(planned(configs, seeds, changes, out, environment))
+    varied = () if variations is None else read_variations(variations)
+    groups = in_order(planned(configs, seeds, changes, out, environment, varied))
     shares = [share for group in groups for share in group]
     check_folder(out)
     total = sum(Config.of(content, "").n_timesteps for content, _, _ in shares)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,15 +17,24 @@ from dms_core.errors import DmsError, InputError, Stopped, extra
 from dms_core.files.output_file import write_bytes
 from dms_core.files.outputs import OutputFile, Outputs
 from exo_env.patient.population import population
+from exo_env.rendering.history import History
+from exo_env.rendering.renderer import Renderer
+from exo_env.rendering.scales import Scales
+from exo_env.rendering.scene import Scene
 
 from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.episode import world_of
+from ..evaluation.fair_play import begin, shown
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
 from .options import device_settings, different_policies, repeated
 
-BAND, FONT, MOST = 44, 18, 4
-"""Height of the titles and size of their letters [pixel], and policies that fit side by side."""
+BAND, FONT, MOST, SIZE = 60, 18, 4, 480
+"""Height of the titles, size of their letters, policies that fit side by side, and width of each of them [pixel]."""
+LETTERS = 76
+"""Letters of a line below a title; a title has room for half as many."""
+FADED = 0.55
+"""Share of white in what stands still after the end of an episode [-]."""
 INK, WARNING, PAPER = (40, 40, 40), (190, 50, 20), (255, 255, 255)
 GIF_STEP = 2
 """A GIF takes every second picture: it is large, and few viewers show 50 a second."""
@@ -89,7 +99,7 @@ def _film(out: Path, stages: list[Stage]) -> None:
 
 
 class Stage:
-    """One policy with its patient, step by step.
+    """One policy with its patient: the scenes of its episode.
 
     Args:
         policy: that assists.
@@ -105,44 +115,66 @@ class Stage:
         self.policy = policy
         self.env = world_of(policy, population(patient).model_dump(), environment, render_mode="rgb_array", **settings)
         self.observation, self.info = self.env.reset(seed=seed)
-        policy.reset(self.env)
+        begin(policy, self.env)
         world: Any = self.env.unwrapped
         self.rate, self.length = round(1.0 / world.period), round(world.duration / world.period) + 1
-        self.over, self.event = False, ""
+        self.scenes: list[Scene] = [world.scene()]
+        self.event = ""
 
-    def step(self) -> None:
-        """One control period, unless the episode is over."""
-        if self.over:
-            return
-        action = self.policy(self.observation, self.info)
-        self.observation, _, terminated, truncated, self.info = self.env.step(action)
-        self.over, self.event = terminated or truncated, str(self.info.get("event", ""))
-
-    def picture(self) -> np.ndarray:
-        """Title and arm, uint8, shape (height, width, 3); after the end, how it ended."""
-        arm: Any = self.env.render()
-        return np.concatenate([band(arm.shape[1], self.policy.title, self.event), arm])
+    def run(self) -> None:
+        """The whole episode; the environment is then closed."""
+        world: Any = self.env.unwrapped
+        over = False
+        while not over:
+            action = self.policy(self.observation, shown(self.info, self.env))
+            self.observation, _, terminated, truncated, self.info = self.env.step(action)
+            self.scenes.append(world.scene())
+            over = terminated or truncated
+        event = self.info.get("event")
+        self.event = "" if event is None else f"ended at {self.scenes[-1].time:.2f} s: {event}"
+        self.env.close()
 
 
 def pictures(stages: list[Stage]) -> Iterator[np.ndarray]:
-    """All stages side by side, until the last one is over; the environments are then closed."""
-    yield np.concatenate([s.picture() for s in stages], axis=1)
-    while not all(s.over for s in stages):
-        for s in stages:
-            s.step()
-        yield np.concatenate([s.picture() for s in stages], axis=1)
-    for s in stages:
-        s.env.close()
+    """All stages side by side, until the last one is over, with the same colours and axes."""
+    for stage in stages:
+        stage.run()
+    every = [stage.scenes for stage in stages]
+    renderer = Renderer("rgb_array", stages[0].rate, SIZE, Scales.spanning([s for scenes in every for s in scenes]))
+    histories = [History(SIZE, scenes, every) for scenes in every]
+    for k in range(max(map(len, every))):
+        yield np.concatenate([_panel(s, h, k, renderer) for s, h in zip(stages, histories, strict=True)], axis=1)
+
+
+def _panel(stage: Stage, history: History, k: int, renderer: Renderer) -> np.ndarray:
+    """A stage at a time: title, arm, and what happened so far; grey after an early end, with the reason."""
+    count = len(stage.scenes)
+    arm = renderer.draw(stage.scenes[min(k, count - 1)])
+    assert arm is not None
+    shown = np.concatenate([arm, history.draw(min(k + 1, count))])
+    ended = bool(stage.event) and k >= count - 1
+    return np.concatenate(
+        [band(SIZE, stage.policy.title, stage.event if ended else ""), grey(shown) if ended else shown]
+    )
+
+
+def grey(picture: np.ndarray) -> np.ndarray:
+    """A picture without colours and faded, uint8, same shape."""
+    faded = FADED * 255.0 + (1.0 - FADED) * picture.mean(axis=-1, keepdims=True)
+    return np.broadcast_to(faded, picture.shape).astype(np.uint8)
 
 
 def band(width: int, title: str, event: str) -> np.ndarray:
-    """A title, and below it what ended the episode."""
+    """A title, and below it in two lines what ended the episode."""
     import pygame
 
     pygame.font.init()
     surface = pygame.Surface((width, BAND))
     surface.fill(PAPER)
-    for text, colour, size, y in ((title, INK, FONT, 4), (event, WARNING, FONT - 5, 26)):
+    lines = [(textwrap.shorten(title, LETTERS // 2, placeholder=" ..."), INK, FONT, 4)]
+    said = textwrap.wrap(event, LETTERS, max_lines=2, placeholder=" ...")
+    lines += [(text, WARNING, FONT - 5, 26 + 16 * k) for k, text in enumerate(said)]
+    for text, colour, size, y in lines:
         line = pygame.font.Font(None, size + 6).render(text, True, colour)
         surface.blit(line, ((width - line.get_width()) // 2, y))
     return pygame.surfarray.array3d(surface).swapaxes(0, 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..training.config_file import TRAINING
 from ..training.records import RECORD, read_curve
 from ..training.run_folder import RunFolder
 from ..training.usable import checked_config
+from .variations import Variation, folder_of
 
 
 def planned(
@@ -20,19 +22,32 @@ def planned(
     changes: tuple[str, ...],
     out: Path,
     environment: str | None = None,
+    variations: Sequence[Variation] = (),
 ) -> list[tuple[dict[str, Any], int, str]]:
     """Configuration, seed and folder of each training.
+
+    Args:
+        configs: files, each trained as it is.
+        seeds: of the trainings.
+        changes: values that replace those of all configurations.
+        out: folder of the trainings.
+        environment: id of the section to take of each file.
+        variations: further configurations with changes of their own.
 
     Raises:
         InputError: a configuration is wrong, or two trainings would share a folder.
     """
-    if not configs or not seeds or min(seeds) < 0:
+    everyone = [*(Variation(path.stem, path) for path in configs), *variations]
+    if not everyone or not seeds or min(seeds) < 0:
         raise InputError("expected one or more configurations, and seeds from 0.")
     shares = []
-    for path in configs:
-        config = checked_config(path, changes, environment)
+    for one in everyone:
+        try:
+            config = checked_config(one.config, (*one.changes, *changes), environment)
+        except InputError as error:
+            raise InputError(f"variation '{one.name}': {error}" if one.changes else str(error)) from None
         for seed in seeds:
-            folder = out.resolve() / f"{path.stem}_{seed}"
+            folder = folder_of(out, one.name, seed)
             shares.append((config.placed(folder, seed).content(), seed, str(folder)))
     folders = [folder for _, _, folder in shares]
     if len(set(folders)) < len(folders):

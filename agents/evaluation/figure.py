@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import drawn, literal, panels, save
+from exo_env.rendering.panels import COLOURS, drawn, literal, note, panels, save
+from exo_env.rendering.quantities import quantity
 
-from .measures import MEASURES
+from .measures import MEASURES, Measure
 from .tables import heading, statistic
 
 COLUMNS = 3
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Distinct for colour-blind readers (Okabe and Ito 2008)."""
 
 
 @drawn
@@ -22,7 +21,10 @@ def draw(path: Path, results: dict[str, Any]) -> None:
     """Draw an evaluation as PNG, by software, whole or not at all."""
     policies = results["policies"]
     names = list(policies)
-    shown = [m for m in MEASURES if all(m.name in p["summary"] for p in policies.values())]
+    known = [m for m in MEASURES if all(m.name in p["summary"] for p in policies.values())]
+    equal = {m.label: quantity(values[0], m.unit) for m in known if np.ptp(values := _values(policies, m)) == 0.0}
+    # A panel of dots on one line would show less than the number.
+    shown = [m for m in known if m.label not in equal] or known[:1]
     rows = -(-len(shown) // COLUMNS)
     figure, axes = panels(rows, COLUMNS, (9.0, rows * (0.9 + 0.4 * len(names))), sharey=True)
     for ax, m in zip(axes.flat, shown, strict=False):
@@ -38,13 +40,23 @@ def draw(path: Path, results: dict[str, Any]) -> None:
             ax.xaxis.set_major_formatter("{x:g}")
     for ax in list(axes.flat)[len(shown) :]:
         ax.set_visible(False)
+    if equal:
+        said = ", ".join(f"{label} {value}" for label, value in equal.items())
+        note(figure, [f"The same in all episodes of all policies: {said}."])
     figure.suptitle(f"{literal(heading(results))}\n{statistic(results)}", fontsize=9)
     save(figure, path)
 
 
+def _values(policies: dict[str, Any], measure: Measure) -> np.ndarray:
+    """A measure of all episodes of all policies, those that could not be had left out; shape (n,), at least one."""
+    values = np.array([e["measures"][measure.name] for p in policies.values() for e in p["episodes"]], dtype=float)
+    finite = values[np.isfinite(values)]
+    return finite if finite.size else np.zeros(1)
+
+
 def _row(ax: Any, k: int, policy: dict[str, Any], measure: str) -> None:
     """Patients and estimate of one policy."""
-    values = np.array([e["measures"][measure] for e in policy["episodes"]])
+    values = np.array([e["measures"][measure] for e in policy["episodes"]], dtype=float)
     colour, e = COLOURS[k % len(COLOURS)], policy["summary"][measure]
     # Dots beside each other, in the order of the episodes.
     ax.plot(values, k + np.linspace(-0.25, 0.25, len(values)), ".", color=colour, alpha=0.35, markersize=4)

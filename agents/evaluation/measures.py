@@ -87,6 +87,8 @@ class Measure:
     """Readings that it needs, TENSION and REPETITIONS among them."""
     rate: bool = False
     """The numbers are 0 or 1, whose mean says how many; their interquartile mean would hide the few."""
+    special: bool = False
+    """Only some tasks have it: where it is missing, nothing is left out."""
 
 
 def _tracking_rms(record: Record) -> float:
@@ -116,14 +118,18 @@ MEASURES = (
     Measure("return", "return", "-", lambda r: math.fsum(r.rewards)),
     Measure("tracking_rms_deg", "tracking, rms", "deg", _tracking_rms, ("tracking_error",)),
     Measure("tracking_peak_deg", "tracking, peak", "deg", _tracking_peak, ("tracking_error",)),
-    Measure("device_work_share", "work of the device", "-", lambda r: _shares(r)[0], WORK),
-    Measure("patient_work_share", "work of the patient", "-", lambda r: _shares(r)[1], WORK),
+    Measure("device_work_share", "work of the device, share", "-", lambda r: _shares(r)[0], WORK),
+    Measure("patient_work_share", "work of the patient, share", "-", lambda r: _shares(r)[1], WORK),
     Measure("peak_tension_N", "peak tension", "N", lambda r: float(r.column(TENSION).max()), (TENSION,)),
     Measure(
         "peak_reaction_N", "peak elbow reaction", "N", lambda r: float(r.column("elbow_reaction").max()),
         ("elbow_reaction",),
     ),
     Measure("smoothness_sparc", "smoothness (SPARC)", "-", _smoothness, ("time", "elbow_angle.rate", REPETITIONS)),
+    Measure(
+        "opposing_power_W", "power against the patient", "W", lambda r: float(r.column("opposing_power").mean()),
+        ("opposing_power",), special=True,
+    ),
     Measure("unsafe", "unsafe episodes", "-", lambda r: float(r.event is not None), rate=True),
     Measure("solver_failures", "solver failures", "-", lambda r: float(r.solver_failed), rate=True),
     Measure("length_s", "length of the episode", "s", lambda r: len(r.rewards) * r.period),
@@ -140,7 +146,7 @@ def measured(record: Record) -> dict[str, float]:
 
 def left_out(record: Record) -> dict[str, list[str]]:
     """Measures that an environment does not allow, with the readings that it lacks."""
-    return {m.name: lacking for m in MEASURES if (lacking := record.lacks(m.reads))}
+    return {m.name: lacking for m in MEASURES if not m.special and (lacking := record.lacks(m.reads))}
 
 
 def measures_among(names: Iterable[str]) -> list[Measure]:

@@ -1,8 +1,8 @@
-"""The figures of a report: learning curves, what tracking costs in help, and patients over time."""
+"""The figures of a report: learning curves, and what tracking costs in help."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,12 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import counted
-from exo_env.rendering.panels import drawn, legend, literal, panels, save
-
-from .figure import COLOURS
-from .time_course import TimeCourse
+from exo_env.rendering.panels import COLOURS, drawn, legend, literal, panels, save
 
 CURVES = (
     ("return", "return of an episode"),
-    ("tracking_rms_deg", "tracking, rms [deg]"),
-    ("device_work_share", "work of the device [-]"),
+    ("tracking_rms_deg", "tracking error, rms [deg]"),
+    ("device_work_share", "device's share of the work [-]"),
 )
 MARKERS = "osD^vP*X"
 PARETO = ("device_work_share", "tracking_rms_deg")
@@ -41,18 +38,26 @@ def learning_curves(path: Path, groups: Sequence[Group]) -> None:
     first = next((e for group in groups for curve in group.curves for e in curve), {})
     shown = [(name, label) for name, label in CURVES if name in first]
     figure, axes = panels(1, len(shown), (3.4 * len(shown), 3.4), sharex="col")
+    steps_in, word = _steps_in(groups)
     for ax, (name, label) in zip(axes.flat, shown, strict=True):
         for k, group in enumerate(groups):
             steps, values = on_common_steps(group.curves, name)
             colour, n = COLOURS[k % len(COLOURS)], len(group.curves)
             seeds = f"{n} seed{'s' * (n > 1)}"
+            steps = steps / steps_in
             ax.plot(steps, values.mean(axis=0), color=colour, marker=".", label=literal(f"{group.label} ({seeds})"))
             ax.fill_between(steps, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0.0)
-        ax.set_xlabel("decisions")
-        ax.set_title(label, fontsize=10)
-        ax.ticklabel_format(axis="x", style="sci", scilimits=(0, 4), useMathText=True)
-    legend(figure, axes.flat[0], 4)
+        ax.set_xlabel(f"decisions{word}")
+        ax.set_ylabel(label)
+    legend(figure, 4)
     save(figure, path)
+
+
+def _steps_in(groups: Sequence[Group]) -> tuple[float, str]:
+    """What the decisions are counted in, and its word for the axis."""
+    most = max((e["steps"] for group in groups for curve in group.curves for e in curve), default=0)
+    scales = ((1e6, " [million]"), (1e3, " [thousand]"), (1.0, ""))
+    return next((scale, word) for scale, word in scales if most >= scale or scale == 1.0)
 
 
 def on_common_steps(curves: Sequence[Sequence[Mapping[str, Any]]], name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -105,7 +110,7 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
     percent = 100.0 * results["confidence"]
     whom = f"{counted(results['patients'], 'patient')}, {results['population']}; {percent:g} % intervals"
     figure.supxlabel(literal(whom), fontsize=9)
-    legend(figure, ax, 3)
+    legend(figure, 3)
     save(figure, path)
 
 
@@ -139,80 +144,3 @@ def _front(ax: Any, policies: Sequence[Mapping[str, Any]]) -> None:
     points = [[p["summary"][name]["value"] for name in PARETO] for p in policies]
     best = sorted(p for p in points if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points))
     ax.step(*zip(*best, strict=True), where="post", color="0.7", linewidth=1.0, linestyle=":", zorder=0)
-
-
-DASHES = (0, (4, 2))
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row of the figure of patients over time: lines of some readings, the second one dashed."""
-
-    label: str
-    reads: tuple[str, ...]
-    lines: str = ""
-    """What the lines are, where there are two."""
-    of: Callable[..., np.ndarray] | None = None
-    """What is drawn of the readings where it is not they themselves."""
-
-    def draw(self, ax: Any, y: Mapping[str, np.ndarray], colour: str, policy: str) -> None:
-        """The lines of one episode."""
-        columns = [y[name] for name in self.reads]
-        shown = columns if self.of is None else [self.of(*columns)]
-        for k, values in enumerate(shown):
-            dashed: dict[str, Any] = {"linestyle": DASHES, "linewidth": 1.0} if k > 0 else {"label": policy}
-            ax.plot(y["time"], values, color=colour, **dashed)
-
-
-ROWS = (
-    Row("elbow flexion [deg]", ("elbow_angle.angle",), of=np.degrees),
-    Row("error [deg]", ("elbow_angle.angle", "reference"), of=lambda angle, psi: np.degrees(angle) - np.degrees(psi)),
-    Row("rope tension [N]", ("agonist_tension", "antagonist_tension"), "solid: agonist, dashed: antagonist"),
-    Row("moment [Nm]", ("exo_moment", "muscle_moment"), "solid: device, dashed: muscles"),
-    Row("effort [-]", ("effort",)),
-)
-
-
-@drawn
-def time_courses(path: Path, columns: Mapping[str, Sequence[TimeCourse]]) -> None:
-    """Patients over time, a column a patient, a colour a policy."""
-    readings = {name for ones in columns.values() for one in ones for name in one.columns}
-    rows = [row for row in ROWS if readings.issuperset(row.reads)]
-    figure, axes = panels(
-        len(rows), len(columns), (1.2 + 4.4 * len(columns), 1.9 * len(rows) + 0.1), sharex="col", sharey="row"
-    )
-    for column, (title, ones) in zip(axes.T, columns.items(), strict=True):
-        y = max((one.columns for one in ones), key=lambda c: len(c["time"]))
-        if "reference" in y:
-            degrees = np.degrees(y["reference"])
-            column[0].plot(y["time"], degrees, color="0.55", linewidth=3.5, alpha=0.6, label="reference")
-        for k, one in enumerate(ones):
-            for ax, row in zip(column, rows, strict=True):
-                row.draw(ax, one.columns, COLOURS[k], literal(one.policy))
-            _mark_event(column[0], one, COLOURS[k])
-        column[0].set_title(literal(f"{title}\n{ones[0].who}"), fontsize=9)
-        column[-1].set_xlabel("time [s]")
-        column[-1].set_ylim(bottom=-0.05)
-    for line, row in zip(axes, rows, strict=True):
-        line[0].set_ylabel(row.label)
-        for other in line if row.lines else ():
-            other.set_title(row.lines, fontsize=7, loc="right", pad=2, color="0.3")
-    figure.align_ylabels()
-    legend(figure, axes[0, 0], 4)
-    save(figure, path)
-
-
-def _mark_event(ax: Any, one: TimeCourse, colour: str) -> None:
-    """A cross where an event ended an episode, and what it was."""
-    angle = one.columns.get("elbow_angle.angle")
-    if one.event is None or angle is None:
-        return
-    end = one.columns["time"][-1], float(np.degrees(angle[-1]))
-    ax.plot(*end, "x", color=colour, markersize=9, markeredgewidth=2.5)
-    said = literal(_short(one.event))
-    ax.annotate(said, end, xytext=(8, 0), textcoords="offset points", va="center", fontsize=7, color=colour)
-
-
-def _short(event: str) -> str:
-    """The first words of what ended an episode."""
-    return event if len(event) <= 60 else event[:57].rsplit(" ", 1)[0] + " ..."

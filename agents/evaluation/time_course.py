@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 
 from dms_core.renamed import replaced
+from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.patient.population import Source, population
 
 from ..environment import ENVIRONMENT
 from ..policies.policy import Policy
-from .episode import world_of
+from .episode import movement_of, world_of
+from .fair_play import begin, shown
+from .measures import Record, measured
 
 READ = (
     "time", "elbow_angle.angle", "reference", "agonist_tension", "antagonist_tension", "muscle_moment", "exo_moment",
-    "effort",
+    "effort", "load",
 )  # fmt: skip
 
 
@@ -33,12 +36,29 @@ class TimeCourse:
     """Shape (n,) each, by those names of READ that the environment has."""
     event: str | None
     """What ended the episode early."""
+    measures: dict[str, float]
+    """As of an evaluation (measures.py)."""
+    hidden: bool = False
+    """Whether the device is not told what the patient wants."""
+
+    @property
+    def wanted(self) -> str:
+        """What the reference is for the device."""
+        return "plan" if self.hidden else "reference"
+
+    @property
+    def load_steps(self) -> list[tuple[float, float]]:
+        """Times at which the load changes [s], and by how much [kg]."""
+        if "load" not in self.columns:
+            return []
+        changes = np.diff(self.columns["load"])
+        return [(float(self.columns["time"][k + 1]), float(changes[k])) for k in np.flatnonzero(changes)]
 
     @property
     def who(self) -> str:
         """The patient in words."""
         shares = [
-            f"{self.patient[f'maximum_activation_{muscles}']:.0%} of the {muscles}"
+            f"{100.0 * self.patient[f'maximum_activation_{muscles}']:.0f} % of the {muscles}"
             for muscles in ("flexors", "extensors")
             if f"maximum_activation_{muscles}" in self.patient
         ]
@@ -67,15 +87,20 @@ def time_course(
     env = world_of(policy, population(patient).model_dump(), environment, **settings)
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=options)
-    policy.reset(env)
+    begin(policy, env)
+    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
     info, rows, over = drawn, [world.readings()], False
+    record.add(rows[0])
     while not over:
-        observation, _, terminated, truncated, info = env.step(policy(observation, info))
+        observation, reward, terminated, truncated, info = env.step(policy(observation, shown(info, env)))
         rows.append(world.readings())
+        record.add_step(float(reward), info)
+        record.add(rows[-1])
         over = terminated or truncated
     env.close()
     columns = {name: np.array([row[name] for row in rows]) for name in READ if name in rows[0]}
-    return TimeCourse(policy.title, drawn.get("patient", {}), drawn.get("load"), columns, info.get("event"))
+    about = drawn.get("patient", {}), drawn.get("load")
+    return TimeCourse(policy.title, *about, columns, info.get("event"), measured(record), bool(world.task.revealing))
 
 
 __getattr__ = replaced(__name__, {"Course": "It is now TimeCourse.", "course": "It is now time_course."})

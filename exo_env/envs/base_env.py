@@ -96,9 +96,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
         self.action_mode, self.drive = s.action_mode, self._made_drive(s)
         check_drive(self.drive, self.ecosystem.device)
         actions = self.drive.actions(self.ecosystem.device)
-        self.task = self.task_type(
-            Parts(self.ecosystem.arm().muscles, tuple(self.ecosystem.device.ropes), actions), s.reward_weights, s.limits
-        )
+        self.task = self.made_task(s, Parts(self.ecosystem.arm().muscles, tuple(self.ecosystem.device.ropes), actions))
         self.movement, self.population = self.made_movement(s.reference), population(s.patient)
         self.load = load_distribution(s.load)
         self.observer = Observer(s.observation, self.task.readings, self.task.groups, s.noise, self.period)
@@ -127,6 +125,10 @@ class AssistanceEnv(Copied, gymnasium.Env):
             device=worn_device(settings.exoskeleton), subject=read_subject(settings.subject),
             misalignment=worn_misalignment(settings.misalignment),
         )  # fmt: skip
+
+    def made_task(self, settings: EnvSettings, parts: Parts) -> Task:
+        """The task, with its weights and limits as the settings change them."""
+        return self.task_type(parts, settings.reward_weights, settings.limits)
 
     def made_movement(self, reference: Any) -> Movement:
         """The movement that patients intend.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,22 +12,34 @@ import numpy as np
 from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.paper.scenarios import ScenarioRun
 from exo_env.paper.summary import SHOWN_MUSCLES, SHOWN_ROPES, magnitude
-from exo_env.rendering.panels import drawn, legend, panels, save
+from exo_env.rendering.curves import Curve, difference, draw, told, told_apart
+from exo_env.rendering.panels import COLOURS, DASHES, drawn, legend, letter, note, panels, save
+from exo_env.rendering.quantities import quantity
 
 if TYPE_CHECKING:
     from exo_env.paper.tuning import Gains
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-"""Colours of the scenarios in turn, distinct for colour-blind readers (Okabe and Ito 2008)."""
-DASHES = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)))
-"""Dashes of the scenarios in turn; with seven colours the same line comes again after 28."""
 WIDTH, HEIGHT = 7.0, 3.6
 """Size of a figure of one panel [inch]."""
 SMALLEST_TOP = 1.0
-"""Least upper end of an axis of forces [N]: a rope that stays slack is drawn on a scale of newtons."""
+"""Forces that stay below are not drawn [N or Nm]: a rope that stays slack is told in words."""
+SETTLED = 0.01
+"""Share of a step within which an angle has come to rest [-]."""
+AT_REST = {"maximum_activation": "the subject commands no muscle", "assistance": "the device does not assist"}
+"""What it means that a field of a scenario is 0."""
 
-Curve = Callable[[ScenarioRun], np.ndarray]
+Quantity = Callable[[ScenarioRun], np.ndarray]
 """A quantity of a run over its times, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A quantity of the scenarios over time."""
+
+    label: str
+    """The quantity in words."""
+    unit: str
+    of: Quantity
 
 
 @dataclass(frozen=True)
@@ -39,20 +51,28 @@ class Line:
     style: dict[str, Any]
     """Colour and dashes, the same in all figures."""
 
+    @property
+    def short(self) -> str:
+        """The label up to its title."""
+        return self.label.partition(":")[0]
+
+    def curve(self, quantity: Quantity) -> Curve:
+        """A quantity of the run."""
+        return Curve(self.short, self.run.times, quantity(self.run), {**self.style, "label": self.label})
+
 
 @dataclass(frozen=True)
 class Figure:
     """Quantities of some scenarios, one below the other over time."""
 
     file: str
-    panels: tuple[tuple[str, Curve], ...]
-    """Label of the axis, and the quantity."""
+    panels: tuple[Panel, ...]
     sensors: tuple[str, ...] = ()
     """Sensors of muscles or ropes that a subject or a device need not have."""
     needs: str | None = None
     """Field of a scenario that must be above 0 for its run to be shown."""
     forces: bool = False
-    """Whether axes reach up to at least SMALLEST_TOP."""
+    """Whether a quantity that stays below SMALLEST_TOP is left out."""
 
 
 def _panels(count: int) -> tuple[Any, list[Any]]:
@@ -64,25 +84,19 @@ def _panels(count: int) -> tuple[Any, list[Any]]:
     return figure, list(axes[:, 0])
 
 
-def _draw(ax: Any, lines: Iterable[Line], curve: Curve) -> None:
-    """Draw a curve for each scenario."""
-    for line in lines:
-        ax.plot(line.run.times, curve(line.run), label=line.label, **line.style)
-
-
-def _legend(figure: Any, ax: Any) -> None:
+def _legend(figure: Any, labels: Sequence[str]) -> None:
     """Four lines in two columns, else three beside each other."""
-    legend(figure, ax, 2 if len(ax.get_legend_handles_labels()[1]) == 4 else 3)
+    legend(figure, 2 if len(labels) == 4 else 3, labels)
 
 
-def _sensor(name: str, factor: float = 1.0) -> Curve:
+def _sensor(name: str, factor: float = 1.0) -> Quantity:
     """A component of the model's sensors times a factor."""
     return lambda run: factor * run.values[name]
 
 
 @drawn
 def step_response(path: Path, times: np.ndarray, angle: np.ndarray, target: float, title: str, gains: Gains) -> Path:
-    """Figs. 6 and 7: hinge angle after a step.
+    """Figs. 6 and 7: hinge angle after a step, until it has come to rest.
 
     Args:
         path: PNG file.
@@ -97,13 +111,25 @@ def step_response(path: Path, times: np.ndarray, angle: np.ndarray, target: floa
     ax.axhline(np.degrees(target), color="k", linestyle=":", linewidth=1.2, label="reference")
     low, high = np.degrees(min(angle.min(), target)), np.degrees(max(angle.max(), target))
     ax.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
-    ax.set_ylabel("angle [deg]")
-    ax.set_title(
-        f"{title}: $K_p$ = {gains.kp:.4g} N/rad, $K_i$ = {gains.ki:.3g} N/(rad s), $K_d$ = {gains.kd:.3g} N s/rad",
-        fontsize=9,
-    )
-    _legend(figure, ax)
+    ax.set_ylabel("hinge angle [deg]")
+    shown = (("$K_p$", gains.kp, "N/rad"), ("$K_i$", gains.ki, "N/(rad s)"), ("$K_d$", gains.kd, "N s/rad"))
+    said = ", ".join(f"{name} = {quantity(value, unit)}" for name, value, unit in shown if value != 0.0)
+    ax.set_title(f"{title}: {said}", fontsize=9)
+    rest = rest_time(times, angle)
+    if 2.0 * rest < times[-1]:
+        ax.set_xlim(-0.1 * rest, 2.0 * rest)
+        later = np.degrees(np.abs(angle[times >= 2.0 * rest] - target).max())
+        note(
+            figure, [f"From {2.0 * rest:.2g} s to {times[-1]:.2g} s it stays within {later:.2g} deg of the reference."]
+        )
+    _legend(figure, ["hinge angle", "reference"])
     return save(figure, path)
+
+
+def rest_time(times: np.ndarray, angle: np.ndarray) -> float:
+    """Time from which an angle stays within SETTLED of its whole way of where it ends [s]."""
+    moving = np.abs(angle - angle[-1]) > SETTLED * abs(angle[-1] - angle[0])
+    return float(times[np.flatnonzero(moving)[-1]]) if moving.any() else float(times[-1])
 
 
 def _both_moments(run: ScenarioRun) -> np.ndarray:
@@ -113,30 +139,38 @@ def _both_moments(run: ScenarioRun) -> np.ndarray:
 
 BICEPS, TRICEPS = SHOWN_MUSCLES.values()
 AGONIST, ANTAGONIST = map(tension_sensor, SHOWN_ROPES)
+FLEXION = Panel("elbow flexion", "deg", _sensor("elbow_angle.angle", 180.0 / np.pi))
+ERROR = Panel("flexion minus reference", "deg", lambda run: FLEXION.of(run) - np.degrees(run.reference))
 FIGURES = (
     Figure(
         "fig10_muscle_forces.png",
-        (("biceps long head [N]", _sensor(BICEPS)), ("triceps long head [N]", _sensor(TRICEPS))),
+        (
+            Panel("biceps force (long head)", "N", _sensor(BICEPS)),
+            Panel("triceps force (long head)", "N", _sensor(TRICEPS)),
+        ),
         sensors=(BICEPS, TRICEPS), needs="maximum_activation", forces=True,
     ),
     Figure(
         "fig11_rope_tensions.png",
-        (("agonist rope, PID 1 [N]", _sensor(AGONIST)), ("antagonist rope, PID 2 [N]", _sensor(ANTAGONIST))),
+        (
+            Panel("agonist tension (PID 1)", "N", _sensor(AGONIST)),
+            Panel("antagonist tension (PID 2)", "N", _sensor(ANTAGONIST)),
+        ),
         sensors=(AGONIST, ANTAGONIST), needs="assistance", forces=True,
     ),
     Figure(
         "fig12_joint_moments.png",
         (
-            ("muscles [Nm]", _sensor("muscle_moment")),
-            ("exoskeleton [Nm]", _sensor("exo_moment")),
-            ("both [Nm]", _both_moments),
+            Panel("moment of the muscles", "Nm", _sensor("muscle_moment")),
+            Panel("moment of the exoskeleton", "Nm", _sensor("exo_moment")),
+            Panel("moment of both together", "Nm", _both_moments),
         ),
     ),
     Figure(
         "fig13_elbow_reactions.png",
         (
-            ("reaction force [N]", lambda run: magnitude(run, "F")),
-            ("reaction moment [Nm]", lambda run: magnitude(run, "M")),
+            Panel("elbow reaction force", "N", lambda run: magnitude(run, "F")),
+            Panel("elbow reaction moment", "Nm", lambda run: magnitude(run, "M")),
         ),
         forces=True,
     ),
@@ -168,9 +202,36 @@ def scenario_figures(folder: Path, runs: Sequence[ScenarioRun], labels: Sequence
             sentences.append(f"{figure.file} is left out: subject and device have no {' and no '.join(missing)}.")
         elif not shown:
             sentences.append(f"{figure.file} is left out: no scenario has a {figure.needs} above 0.")
+        elif not (kept := _above(figure, shown)):
+            sentences.append(f"{figure.file} is left out: {_below(figure.panels, shown)}")
         else:
-            _stacked(folder / figure.file, figure, shown)
+            _stacked(folder / figure.file, figure, kept, shown, _left_out(figure, kept, lines, shown))
     return sentences
+
+
+def _highest(panel: Panel, lines: Sequence[Line]) -> float:
+    """Largest size of a quantity in some scenarios."""
+    return max(float(np.abs(panel.of(line.run)).max()) for line in lines)
+
+
+def _above(figure: Figure, lines: Sequence[Line]) -> list[Panel]:
+    """The quantities of a figure that show something."""
+    return [p for p in figure.panels if not figure.forces or _highest(p, lines) >= SMALLEST_TOP]
+
+
+def _below(declared: Sequence[Panel], lines: Sequence[Line]) -> str:
+    """A sentence on quantities that show nothing."""
+    said = [f"{p.label} is at most {quantity(_highest(p, lines), p.unit, 2)}" for p in declared]
+    return f"{'; '.join(said)} in all scenarios shown." if said else ""
+
+
+def _left_out(figure: Figure, kept: Sequence[Panel], lines: Sequence[Line], shown: Sequence[Line]) -> list[str]:
+    """Sentences on the scenarios and quantities that a figure does not draw."""
+    sentences = [
+        f'Not drawn: "{x.label}", in which {AT_REST[figure.needs]}.' for x in lines if figure.needs and x not in shown
+    ]
+    dropped = _below([p for p in figure.panels if p not in kept], shown)
+    return sentences + ([f"Not drawn: {dropped}"] if dropped else [])
 
 
 @drawn
@@ -178,24 +239,40 @@ def _trajectories(path: Path, lines: Sequence[Line]) -> None:
     """Fig. 9: angles, and below them the errors that the eye cannot see there."""
     figure, (above, below) = _panels(2)
     first = lines[0].run
-    above.plot(first.times, np.degrees(first.reference), color="k", linewidth=2.5, alpha=0.35, label="reference")
-    _draw(above, lines, _sensor("elbow_angle.angle", 180.0 / np.pi))
-    _draw(below, lines, lambda run: np.degrees(run.values["elbow_angle.angle"] - run.reference))
-    above.set_ylabel("elbow flexion [deg]")
-    below.set_ylabel("flexion - reference [deg]")
-    _legend(figure, above)
+    bold = {"color": "k", "linewidth": 2.5, "alpha": 0.35, "label": "reference"}
+    reference = Curve("the reference", first.times, np.degrees(first.reference), bold)
+    kept, twins = told_apart([reference, *(line.curve(FLEXION.of) for line in lines)])
+    draw(above, kept)
+    draw(below, [line.curve(ERROR.of) for line in lines])
+    for ax, panel in ((above, FLEXION), (below, ERROR)):
+        ax.set_ylabel(f"{panel.label} [{panel.unit}]")
+    if twins:
+        note(figure, [f"Not drawn in a, but in b: {told(twins, FLEXION.unit)}."])
+    _legend(figure, ["reference", *(line.label for line in lines)])
     save(figure, path)
 
 
 @drawn
-def _stacked(path: Path, declared: Figure, lines: Sequence[Line]) -> None:
-    """The quantities of a figure, one below the other."""
-    figure, axes = _panels(len(declared.panels))
-    for ax, (label, curve) in zip(axes, declared.panels, strict=True):
-        _draw(ax, lines, curve)
-        ax.set_ylabel(label)
-        low, high = ax.get_ylim()
-        if declared.forces:
-            ax.set_ylim(low if high > SMALLEST_TOP else -0.1 * SMALLEST_TOP, max(high, SMALLEST_TOP))
-    _legend(figure, axes[0])
+def _stacked(
+    path: Path, declared: Figure, shown: Sequence[Panel], lines: Sequence[Line], sentences: Sequence[str]
+) -> None:
+    """Quantities of a figure, one below the other; curves that lie on each other as differences below them."""
+    parts = [(panel, *told_apart([line.curve(panel.of) for line in lines])) for panel in shown]
+    figure, axes = _panels(len(parts) + sum(bool(twins) for _, _, twins in parts))
+    rest, said = iter(axes), []
+    for panel, kept, twins in parts:
+        ax = next(rest)
+        draw(ax, kept)
+        ax.set_ylabel(f"{panel.label} [{panel.unit}]")
+        if twins:
+            below = next(rest)
+            differences, again = told_apart([difference(twin.curve, twin.on) for twin in twins])
+            draw(below, differences)
+            names = sorted({twin.on.name for twin in twins})
+            below.set_ylabel(f"{panel.label}:\ndifference to {', '.join(names)} [{panel.unit}]")
+            a, b, on = letter(figure, ax), letter(figure, below), told(twins, panel.unit)
+            said.append(f"Not drawn in {a}, but in {b}: {on}.")
+            said += [f"Not drawn in {b}: {told(again, panel.unit)}."] if again else []
+    note(figure, [*said, *sentences])
+    _legend(figure, [line.label for line in lines])
     save(figure, path)

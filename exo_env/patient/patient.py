@@ -131,7 +131,7 @@ class Patient(Person):
     feedback_gain: float = trait(
         0.0, ge=0.0, le=5.0, unit="1/rad", acts="effort",
         description="proprioceptive feedback: excitation of the flexors, before weakness, per tracking error [1/rad]; "
-        "extensors minus it; that of a healthy elbow from its stiffness [Gomi 1998], [Zahalak 1979], "
+        "extensors minus it; healthy from the stiffness of elbows that hold [Gomi 1998] and move "
         "[Bennett 1993], after stroke assumed",
     )  # fmt: skip
     feedback_delay: float = trait(

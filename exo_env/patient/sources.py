@@ -84,9 +84,5 @@ SOURCES = {
     "Wolbrecht 2008": Source(
         "IEEE Trans. Neural Syst. Rehabil. Eng. 16:286-297", "people after stroke let the robot do the work"
     ),
-    "Zahalak 1979": Source(
-        "J. Biomech. Eng. 101:28-37, doi:10.1115/1.3426220",
-        "stiffness of the active elbow, 100 Nm/rad at a fifth of the strongest effort, in proportion to the force",
-    ),
 }
 """Sources by label, in alphabetical order."""

@@ -1,6 +1,6 @@
-"""A square to draw on with pygame: shapes in fine pixels that are averaged down, then words over them.
+"""A square or a strip to draw on with pygame: shapes in fine pixels that are averaged down, then words over them.
 
-Lengths of the layout (widths, radii, boxes) are given for a square of 480 pixels and grow with it; points of polygons
+Lengths of the layout (widths, radii, boxes) are given for a width of 480 pixels and grow with it; points of polygons
 and lines are in fine pixels, which are `FINER` times smaller than those of the result.
 """
 
@@ -21,7 +21,7 @@ ALIGNMENTS: tuple[Alignment, ...] = get_args(Alignment)
 Box = tuple[float, float, float, float]
 """x, y, width, height of a part of the layout."""
 DESIGN = 480.0
-"""Side of the square for which lengths of the layout are given [pixel]."""
+"""Width for which lengths of the layout are given [pixel]."""
 FINER = 2
 """Fine pixels per pixel of the result, along a side: the averages smooth all edges."""
 FONT_HEIGHTS = {"small": 14, "normal": 16}
@@ -51,24 +51,25 @@ def import_pygame() -> Any:
 
 
 class Canvas:
-    """The square.
+    """The square or strip.
 
     Args:
-        size: height and width of the result [pixel].
+        size: width of the result [pixel].
+        height: of the result [pixel]; a square where it is not given.
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, height: int | None = None) -> None:
         self.pygame = import_pygame()
-        self.size, self.zoom = size, size / DESIGN
+        self.size, self.height, self.zoom = size, height or size, size / DESIGN
         self.unit = FINER * self.zoom
-        self._fine = self.pygame.Surface((FINER * size, FINER * size), 0, 32)
-        self._result = self.pygame.Surface((size, size), 0, 32)
+        self._fine = self.pygame.Surface((FINER * size, FINER * self.height), 0, 32)
+        self._result = self.pygame.Surface((size, self.height), 0, 32)
         self.pygame.font.init()
         # The font that pygame brings along, so that pictures are the same on all machines.
         self._fonts = {k: self.pygame.font.Font(None, max(round(h * self.zoom), 6)) for k, h in FONT_HEIGHTS.items()}
 
     def clear(self, colour: Colour) -> None:
-        """Begin a picture: fill the square with a colour."""
+        """Begin a picture: fill everything with a colour."""
         self._fine.fill(colour)
 
     def polygon(self, outline: np.ndarray, colour: Colour, edge: Colour | None = None, width: float = 0.0) -> None:
@@ -120,7 +121,7 @@ class Canvas:
 
     def smooth(self) -> None:
         """Average the fine pixels; words come after this, shapes before."""
-        self.pygame.transform.smoothscale(self._fine, (self.size, self.size), self._result)
+        self.pygame.transform.smoothscale(self._fine, (self.size, self.height), self._result)
 
     def words(
         self,
@@ -145,6 +146,6 @@ class Canvas:
         return self._result
 
     def pixels(self) -> np.ndarray:
-        """A copy of the result: red, green, blue; uint8, shape (size, size, 3)."""
+        """A copy of the result: red, green, blue; uint8, shape (height, size, 3)."""
         data = self.pygame.image.tobytes(self._result, "RGB")
-        return np.frombuffer(data, dtype=np.uint8).reshape(self.size, self.size, 3).copy()
+        return np.frombuffer(data, dtype=np.uint8).reshape(self.height, self.size, 3).copy()

@@ -26,7 +26,8 @@ def scene_of(now: Readout, label: str) -> Scene:
         label: words that name the patient.
     """
     episode, angle, hinge = now.episode, now.sensor("elbow_angle.angle"), now.sensor("exo_angle.angle")
-    psi = float(now.world.tables.plan.course[now.world.tables.status[STATUS.step], 0])
+    plan, step = now.world.tables.plan, int(now.world.tables.status[STATUS.step])
+    psi = float(plan.course[step, 0])
     arm, machine = episode.arm, episode.ecosystem.machine
     assert machine is not None
     grip = arm.elbow + arm.rotation(angle) @ arm.grip
@@ -49,9 +50,10 @@ def scene_of(now: Readout, label: str) -> Scene:
         muscle_moment=now.sensor("muscle_moment"),
         device_moment=now.sensor("exo_moment"),
         effort=episode.effort,
+        plan_hidden=bool(now.world.task.revealing),
         label=label,
         weight=weight[:2],
-        weight_mass=episode.ecosystem.weight,
+        weight_mass=float(plan.loads[step]),
         pulleys=(low[:2], high[:2]),
         gym_rope=np.array([grip, tied, low, high, weight])[:, :2],
     )

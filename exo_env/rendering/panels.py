@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -15,6 +16,14 @@ P = ParamSpec("P")
 R = TypeVar("R")
 RESOLUTION = 150
 """Resolution of the figures [dots per inch]."""
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+"""Colours of curves in turn, distinct for colour-blind readers (Okabe and Ito 2008)."""
+DASHES = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)))
+"""Dashes of curves in turn; with seven colours the same line comes again after 28."""
+FORMATS = (".png", ".svg", ".pdf")
+"""Endings of pictures that can be written."""
+LETTERS_AN_INCH = 14.0
+"""Letters of a note that fit into an inch."""
 
 
 def require_matplotlib() -> None:
@@ -62,10 +71,41 @@ def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) ->
     return figure, axes
 
 
-def legend(figure: Any, ax: Any, columns: int) -> None:
-    """Name the curves in `ax` above the panels, never on a curve."""
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False, fontsize=8)
+def visible(figure: Any) -> list[Any]:
+    """The panels of a figure that are shown, in the order of their letters."""
+    return [ax for ax in figure.axes if ax.get_visible()]
+
+
+def letter(figure: Any, ax: Any) -> str:
+    """Letter of a panel, by which notes name it."""
+    return chr(ord("a") + visible(figure).index(ax))
+
+
+def legend(figure: Any, columns: int, order: Sequence[str] = ()) -> None:
+    """Name the curves of all panels, each name once, above the panels, never on a curve.
+
+    Args:
+        figure: whose panels are drawn.
+        columns: of the legend.
+        order: names that come first, in this order.
+    """
+    found: dict[str, Any] = {}
+    for ax in visible(figure):
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    names = [name for name in order if name in found] + [name for name in found if name not in order]
+    if names:
+        figure.legend(
+            [found[name] for name in names], names, loc="outside upper center", ncols=columns, frameon=False, fontsize=8
+        )
+
+
+def note(figure: Any, sentences: Sequence[str]) -> None:
+    """Sentences below the panels, of what is not drawn and why."""
+    width = round(LETTERS_AN_INCH * figure.get_figwidth())
+    lines = [line for sentence in sentences for line in textwrap.wrap(sentence, width)]
+    if lines:
+        figure.supxlabel(literal("\n".join(lines)), fontsize=8, color="0.25")
 
 
 def literal(text: str) -> str:
@@ -74,8 +114,16 @@ def literal(text: str) -> str:
 
 
 def save(figure: Any, path: Path) -> Path:
-    """Write a picture as PNG, whole or not at all."""
+    """Write a picture whole or not at all, as its name ends; several panels get letters."""
+    shown = visible(figure)
+    for ax in shown if len(shown) > 1 else ():
+        ax.annotate(
+            letter(figure, ax), (0.0, 1.0), xytext=(-8.0, 5.0), xycoords="axes fraction", textcoords="offset points",
+            ha="right", va="bottom", fontweight="bold", fontsize=11,
+        )  # fmt: skip
     picture = io.BytesIO()
-    figure.savefig(picture, format="png")
+    # Without the day, so that the same figure is the same file.
+    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
+    figure.savefig(picture, format=path.suffix.removeprefix("."), metadata=metadata)
     write_bytes(path, picture.getvalue())
     return path

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from exo_env.rendering.canvas import ALIGNMENTS, FINER, Box, Canvas, Colour
+from exo_env.rendering.quantities import fixed
+from exo_env.rendering.scales import Scales
 from exo_env.rendering.scene import Scene
 from exo_env.rendering.shapes import dashes, limb, rounded, spindle
 
@@ -23,11 +25,9 @@ STEEL, STEEL_EDGE, STEEL_LIGHT = (112, 124, 140), (58, 66, 78), (236, 239, 243)
 ROPE, IRON = (92, 98, 108), (66, 72, 82)
 REFERENCE = (0, 140, 105)
 ACTIVATION: tuple[Colour, ...] = ((36, 88, 200), (146, 66, 158), (220, 28, 40))
-"""Colours of muscles, from activation 0 to 1: blue, purple, red."""
+"""Colours of muscles, from activation 0 to the end of its scale: blue, purple, red."""
 TENSION: tuple[Colour, ...] = ((196, 200, 206), (244, 180, 48), (190, 72, 0))
-"""Colours of the device's ropes, from slack to FULL_TENSION and beyond: grey, yellow, brown."""
-FULL_TENSION = 200.0
-"""End of the scale of tensions [N], the same in all pictures: the largest of the action mode rope_tension."""
+"""Colours of the device's ropes, from slack to the end of the scale and beyond: grey, yellow, brown."""
 WINDOW = 2.8
 """Side of the main view over the length of the upper arm [-]."""
 ELBOW_AT = (0.27, 0.47)
@@ -64,9 +64,9 @@ def lighter(colour: Colour) -> Colour:
     return red + (255 - red) // 4, green + (255 - green) // 4, blue + (255 - blue) // 4
 
 
-def tension_share(tension: float) -> float:
-    """Place on the scale of tensions, 0 to 1: the square root, so that a tenth of its end is well seen."""
-    return float(np.sqrt(min(max(tension / FULL_TENSION, 0.0), 1.0)))
+def root_share(value: float, end: float) -> float:
+    """Place on a scale, 0 to 1: the square root, so that a tenth of its end is well seen."""
+    return float(np.sqrt(min(max(value / end, 0.0), 1.0)))
 
 
 class View(NamedTuple):
@@ -85,10 +85,10 @@ class View(NamedTuple):
 
 
 class Picture:
-    """Draws scenes on a canvas."""
+    """Draws scenes on a canvas, in colours up to the ends of the scales."""
 
-    def __init__(self, canvas: Canvas) -> None:
-        self.canvas = canvas
+    def __init__(self, canvas: Canvas, scales: Scales) -> None:
+        self.canvas, self.scales = canvas, scales
 
     def draw(self, scene: Scene) -> None:
         """Draw a scene over the last one."""
@@ -156,8 +156,9 @@ class Picture:
 
     def _muscle(self, points: np.ndarray, activation: float) -> None:
         """A spindle that swells with activation."""
-        colour = gradient(ACTIVATION, activation)
-        belly = (8.0 + 5.0 * activation) * self.canvas.unit
+        share = min(activation / self.scales.activation, 1.0)
+        colour = gradient(ACTIVATION, share)
+        belly = (8.0 + 5.0 * share) * self.canvas.unit
         self.canvas.polygon(spindle(points, belly, 0.35 * belly), colour, darker(colour), 0.7)
         self.canvas.polygon(spindle(points, 0.3 * belly, 0.0), lighter(colour))
 
@@ -173,7 +174,7 @@ class Picture:
         for points, width in bars:
             self.canvas.line(points, STEEL, width)
         for points, tension in scene.ropes:
-            share = tension_share(tension)
+            share = root_share(tension, self.scales.tension)
             colour, width = gradient(TENSION, share), 1.8 + 3.0 * share
             self.canvas.line(view(points), darker(colour), width + 1.2)
             self.canvas.line(view(points), colour, width)
@@ -234,8 +235,8 @@ class Picture:
         """Titles and ends of the bars; half of the scale of tensions is a quarter of its end."""
         x, y, width, _ = SCALES
         for column, title, ends in (
-            (x + 10, "activation", ("0", "0.5", "1")),
-            (x + width - 10 - BAR, "tension [N]", ("0", f"{0.25 * FULL_TENSION:.0f}", f"{FULL_TENSION:.0f}")),
+            (x + 10, "activation [-]", ("0", f"{0.5 * self.scales.activation:g}", f"{self.scales.activation:g}")),
+            (x + width - 10 - BAR, "tension [N]", ("0", f"{0.25 * self.scales.tension:g}", f"{self.scales.tension:g}")),
         ):
             self.canvas.words(title, (column, y + 7), GREY, "small")
             for text, share, align in zip(ends, (0.0, 0.5, 1.0), ALIGNMENTS, strict=True):
@@ -246,13 +247,17 @@ class Picture:
         x, y, width, _ = READINGS
         self.canvas.words(scene.label, (x + 10, y + 9), INK, "small", width=width - 20)
         rows = (
-            ("time", f"{scene.time:.2f} s", INK),
-            ("angle", f"{np.degrees(scene.elbow_angle):.1f}\u00b0", INK),
-            ("reference", f"{np.degrees(scene.reference_angle):.1f}\u00b0", REFERENCE),
-            ("error", f"{scene.error_deg:+.1f}\u00b0", INK),
-            ("muscles", f"{scene.muscle_moment:.1f} Nm", INK),
-            ("device", f"{scene.device_moment:.1f} Nm", INK),
-            ("effort", f"{scene.effort:.2f}", INK),
+            ("time", f"{fixed(scene.time, 2)} s", INK),
+            ("angle", f"{fixed(np.degrees(scene.elbow_angle), 1)}\u00b0", INK),
+            (
+                "plan (hidden)" if scene.plan_hidden else "reference",
+                f"{fixed(np.degrees(scene.reference_angle), 1)}\u00b0",
+                REFERENCE,
+            ),
+            ("error", f"{fixed(scene.error_deg, 1, sign=True)}\u00b0", INK),
+            ("muscles", f"{fixed(scene.muscle_moment, 1)} Nm", INK),
+            ("device", f"{fixed(scene.device_moment, 1)} Nm", INK),
+            ("effort", fixed(scene.effort, 2), INK),
         )
         for k, (name, value, colour) in enumerate(rows):
             self.canvas.words(name, (x + 10, y + 28 + 15 * k), GREY)

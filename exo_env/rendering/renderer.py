@@ -12,6 +12,7 @@ import numpy as np
 from dms_core.errors import DmsError, InputError
 from exo_env.rendering.canvas import Canvas
 from exo_env.rendering.picture import Picture
+from exo_env.rendering.scales import Scales
 from exo_env.rendering.scene import Scene
 
 RenderMode = Literal["rgb_array", "human"]
@@ -27,9 +28,10 @@ class Renderer:
         mode: 'rgb_array' returns each picture; 'human' shows it in a window.
         fps: pictures per second of the window, which waits for its turn; an array never waits [1/s].
         size: height and width [pixel].
+        scales: ends of the colours' scales.
     """
 
-    def __init__(self, mode: RenderMode, fps: int, size: int = 480) -> None:
+    def __init__(self, mode: RenderMode, fps: int, size: int = 480, scales: Scales | None = None) -> None:
         if mode not in get_args(RenderMode):
             raise InputError(f"render mode '{mode}' is unknown. Known: {', '.join(get_args(RenderMode))}.")
         if fps <= 0:
@@ -39,7 +41,8 @@ class Renderer:
         self.mode: RenderMode = mode
         self.fps, self.size = fps, size
         self._canvas = Canvas(size)
-        self._picture = Picture(self._canvas)
+        self.scales = scales or Scales()
+        self._picture = Picture(self._canvas, self.scales)
         self._window: Any = None
         self._clock: Any = None
 
@@ -80,6 +83,6 @@ class Renderer:
             self._canvas.pygame.display.quit()
             self._window = self._clock = None
 
-    def __reduce__(self) -> tuple[type[Renderer], tuple[RenderMode, int, int]]:
+    def __reduce__(self) -> tuple[type[Renderer], tuple[RenderMode, int, int, Scales]]:
         """Surfaces cannot be pickled; a copy draws the same on new ones."""
-        return Renderer, (self.mode, self.fps, self.size)
+        return Renderer, (self.mode, self.fps, self.size, self.scales)

@@ -18,7 +18,7 @@ RopePath = tuple[np.ndarray, float]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """One moment of an episode. Without a gym machine the last four fields keep their defaults."""
+    """One moment of an episode; without a gym machine the last four fields keep their defaults."""
 
     shoulder: np.ndarray
     """Centre of the shoulder [m], shape (2,)."""
@@ -36,7 +36,7 @@ class Scene:
     elbow_angle: float
     """Elbow flexion [rad]."""
     reference_angle: float
-    """Elbow flexion that the exercise asks for [rad]."""
+    """Elbow flexion that the exercise asks for, or that the patient wants [rad]."""
     time: float
     """Since the start of the episode [s]."""
     error_deg: float
@@ -47,12 +47,14 @@ class Scene:
     """Moment of the device's ropes about its hinge, flexion positive [Nm]."""
     effort: float
     """What the patient intends, as a multiple of what was planned [-]."""
+    plan_hidden: bool = False
+    """Whether the reference is a plan of the patient's that the device is not told."""
     label: str = ""
     """Words that name the patient."""
     weight: np.ndarray | None = None
     """Centre of the weight [m], shape (2,)."""
     weight_mass: float | None = None
-    """Mass of the weight [kg]."""
+    """Mass of the weight at this time [kg]."""
     pulleys: tuple[np.ndarray, ...] = ()
     """Pulleys of the gym machine [m], each of shape (2,)."""
     gym_rope: np.ndarray | None = None

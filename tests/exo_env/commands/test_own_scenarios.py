@@ -10,8 +10,9 @@ import yaml
 from dms_core.config_files import config_file
 from exo_env.__main__ import main
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.paper.figures import COLOURS, DASHES, scenario_figures
+from exo_env.paper.figures import scenario_figures
 from exo_env.paper.scenarios import Exercise, Scenario, load_scenarios, run
+from exo_env.rendering.panels import COLOURS, DASHES
 
 EXERCISE = {
     "times": [0.1, 0.9],
