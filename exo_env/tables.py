@@ -119,6 +119,9 @@ class PlanTables(NamedTuple):
     """Weight on the machine at each control time [kg], shape (k,)."""
     needed: Filled
     """Moment that arm and load need along psi at each control time [Nm], shape (k,)."""
+    able: Filled
+    """Moment that a patient, as fatigued as at the start, can give over that which holds arm and load, at each control
+    time [-], shape (k,)."""
     lacking: Cleared
     """What the patient cannot give of the needed moment at each control time [Nm], shape (k,)."""
     scale: Cleared

@@ -10,6 +10,9 @@ What is lacking along the reference, with the moment M_need of arm and weight (m
 and the moment M_own that holds the lower link of the device, which is no help to carry:
 
     M_lack = (1 - ability) max(M_need, 0) + M_own
+
+In the course of an episode the patient tires: ability then is that of a moment M_voluntary that has fallen, or risen,
+as the rested share of the flexors has since the start.
 """
 
 from __future__ import annotations
@@ -46,19 +49,34 @@ def voluntary(patient, arm, angle):
 
 @compiled
 def able(patient, arm, load):
-    """Share of arm and load that a patient can hold [-]; tables as in static_optimisation.py."""
+    """M_voluntary / M_hold, which may be above 1 [-]; tables as in static_optimisation.py."""
     hold = needed_moment(arm, load, MIDDLE, 0.0, 0.0)
-    return min(max(voluntary(patient, arm, MIDDLE) / hold, 0.0), 1.0) if hold > 0.0 else 1.0
+    return max(voluntary(patient, arm, MIDDLE) / hold, 0.0) if hold > 0.0 else math.inf
 
 
 @compiled
-def put_lacking(patient, arm, load, weights, link, course, needed, lacking):
-    """Fill M_need and M_lack [Nm] along a course with a weight at each time; gives ability and scale as in `Need`.
+def lacking_when(lacking, needed, ratio, rested):
+    """M_lack [Nm] of a patient who has tired.
+
+    Args:
+        lacking: M_lack as fatigued as at the start [Nm].
+        needed: M_need [Nm].
+        ratio: M_voluntary / M_hold as fatigued as at the start [-].
+        rested: rested share of the flexors over that at the start [-].
+    """
+    return lacking + (min(ratio, 1.0) - min(ratio * rested, 1.0)) * max(needed, 0.0)
+
+
+@compiled
+def put_lacking(patient, arm, load, weights, link, course, needed, ratio, lacking):
+    """Fill M_need [Nm], M_voluntary / M_hold [-] and M_lack [Nm] along a course with a weight at each time.
+
+    Gives ability and scale as in `Need`.
 
     The ability is that with the weight of `load`; who carries more for a while lacks more.
     """
-    ability, total, gravity = able(patient, arm, load), 0.0, vec(load.gravity, 0)
-    g, share, weight = math.sqrt(dot(gravity, gravity)), ability, load.weight
+    share, total, gravity = able(patient, arm, load), 0.0, vec(load.gravity, 0)
+    g, ability, weight = math.sqrt(dot(gravity, gravity)), min(share, 1.0), load.weight
     needed_moments(arm, load, weights, course, needed)
     for k in range(course.shape[0]):
         if weights[k] != weight:
@@ -66,7 +84,8 @@ def put_lacking(patient, arm, load, weights, link, course, needed, lacking):
             share = able(patient, arm, with_weight(load, weight))
         most = max(needed[k], 0.0)
         total += most
-        lacking[k] = (1.0 - share) * most + link_moment(link, course[k, 0], g)
+        ratio[k] = share
+        lacking[k] = (1.0 - min(share, 1.0)) * most + link_moment(link, course[k, 0], g)
     return ability, max(total / course.shape[0], SMALLEST_SCALE)
 
 
@@ -77,7 +96,7 @@ def ability(patient: Patient, known: InternalModel) -> float:
         patient: the patient.
         known: internal model with the patient's arm, the machine and the real weight.
     """
-    return able(patient.row(), known.arm, known.load)
+    return min(able(patient.row(), known.arm, known.load), 1.0)
 
 
 @dataclass(frozen=True)

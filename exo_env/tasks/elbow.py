@@ -11,7 +11,9 @@ import math
 from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner, matrix
 from exo_env.ecosystem.sensors import muscle_sensor, tension_sensor
+from exo_env.patient.ability import lacking_when
 from exo_env.patient.effort import PRESENT
+from exo_env.patient.patient import PATIENT
 from exo_env.patient.slacking import MOST_EFFORT
 from exo_env.places import places
 from exo_env.tables import DRIVE, EFFORT, PATIENT_TABLES, PLAN, WORLD
@@ -99,6 +101,21 @@ def device_share(muscles, device):
     way = math.copysign(1.0, both)
     carried, own = max(way * device, 0.0), max(way * muscles, 0.0)
     return carried / (carried + own)
+
+
+@compiled
+def lacking_of(w):
+    """What the patient, as tired as now, lacks of the moment that the plan needs now, with that of the device [Nm]."""
+    plan, patient, k = inner(w, WORLD.plan), inner(w, WORLD.patient), step_of(w)
+    state, fresh = inner(patient, PATIENT_TABLES.effort), 0.0
+    sign, fatigued, rested = floats(state, EFFORT.sign), floats(state, EFFORT.fatigued), 0.0
+    for i in range(sign.shape[0]):
+        if sign[i] > 0.0:
+            fresh += 1.0 - floats(patient, PATIENT_TABLES.traits)[PATIENT.fatigued_at_start]
+            rested += 1.0 - fatigued[i]
+    return lacking_when(
+        floats(plan, PLAN.lacking)[k], floats(plan, PLAN.needed)[k], floats(plan, PLAN.able)[k], rested / fresh
+    )
 
 
 @compiled

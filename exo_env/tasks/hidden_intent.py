@@ -21,6 +21,7 @@ from exo_env.tasks.elbow import (
     action_channel,
     device_channels,
     elbow_readings,
+    lacking_of,
     privileged_channels,
     read_elbow,
 )
@@ -87,7 +88,7 @@ def read_intent(w):
     )  # fmt: skip
     needed = floats(plan, PLAN.needed)[k]
     r[at[INTENT.intent_acceleration]], r[at[INTENT.needed_moment]] = course[k, 2], needed
-    r[at[INTENT.lacking_moment]] = floats(plan, PLAN.lacking)[k]
+    r[at[INTENT.lacking_moment]] = lacking_of(w)
     r[at[INTENT.opposing_power]] = opposing_power(r[at[ELBOW.exo_moment]], needed, course[k, 1])
     r[at[INTENT.clock]] = k * floats(w, WORLD.period)[0]
 
@@ -101,7 +102,7 @@ def judge_intent(w):
     if event_of(w) == NOTHING:
         end_with(w, exceeded(task_numbers(w), r[at[ELBOW.angle]], tensions, reaction))
     term_values(
-        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], floats(plan, PLAN.lacking)[step_of(w)], scale, reaction,
+        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], lacking_of(w), scale, reaction,
         floats(drive, DRIVE.action), floats(drive, DRIVE.before), event_of(w) != NOTHING, terms,
     )  # fmt: skip
     terms[INTENT_TERM.opposition] = opposition(r[at[INTENT.opposing_power]], scale)

@@ -6,8 +6,9 @@ off (the hand goes back to where it came from) or redirected (to another target)
 (submovements.py). In a pause the patient may pick something up, and in a later one put it down. All of it is drawn, and
 nothing tells it to the device.
 
-Ranges are assumed, wide enough that the time says nothing about the plan, within what the exercise of a weak arm has:
-angles between 20 and 100 deg, where the muscles' straight lines have leverage (ecosystem/arm.py), moves of 0.8 to 2 s
+Ranges are assumed, wide enough that the time says nothing about the plan: the mean of psi over many plans is the same
+at all times within 1 deg, and explains 0.04 % of the variance of psi (22 % if all began between 20 and 40 deg). Angles
+lie between 20 and 100 deg, where the muscles' straight lines have leverage (ecosystem/arm.py), moves of 0.8 to 2 s
 with peak rates up to 140 deg/s. In tasks of daily living the elbow moves with peak rates of about that size (Murphy,
 Sunnerhagen, Johnels and Willen 2006, J. Neuroeng. Rehabil. 3:18, drinking from a glass).
 """
@@ -76,7 +77,7 @@ class Intentions(Movement):
     """Plans to draw from: a distribution for each number of a move, see patient/distributions.py."""
 
     kernel: ClassVar[Any] = _put_intentions
-    start_deg: Any = Field(default={"uniform": [20.0, 40.0]}, description="angle at the start [deg]")
+    start_deg: Any = Field(default={"uniform": [LOWEST, HIGHEST]}, description="angle at the start [deg]")
     rest: Any = Field(default={"uniform": [0.2, 3.0]}, description="at the begin of a window [s]")
     targets: Any = Field(default={"choice": [2, 3, 4]}, description="in a window, if there is time for them")
     amplitude_deg: Any = Field(default={"uniform": [10.0, 60.0]}, description="of a move, either way [deg]")

@@ -18,6 +18,7 @@ from exo_env.tasks.elbow import (
     device_channels,
     elbow_readings,
     emg_channels,
+    lacking_of,
     privileged_channels,
     read_elbow,
 )
@@ -71,7 +72,7 @@ def _judge(w):
     if event_of(w) == NOTHING:
         end_with(w, exceeded(task_numbers(w), r[at[ELBOW.angle]], tensions, reaction))
     term_values(
-        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], floats(plan, PLAN.lacking)[step_of(w)],
+        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], lacking_of(w),
         floats(plan, PLAN.scale)[0], reaction, floats(drive, DRIVE.action), floats(drive, DRIVE.before),
         event_of(w) != NOTHING, terms_of(w),
     )  # fmt: skip

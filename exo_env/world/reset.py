@@ -231,7 +231,7 @@ def put_patient(w, arm, load, activations):
     link = floats(inner(w, WORLD.subject), SUBJECT.link)
     ability, scale = put_lacking(
         traits, arm, load, floats(plan, PLAN.loads), link, matrix(plan, PLAN.course), floats(plan, PLAN.needed),
-        floats(plan, PLAN.lacking),
+        floats(plan, PLAN.able), floats(plan, PLAN.lacking),
     )  # fmt: skip
     floats(w, WORLD.outcome)[OUTCOME.ability], floats(plan, PLAN.scale)[0] = ability, scale
     effort, wanted = effort_of(w), matrix(patient, PATIENT_TABLES.wanted)[0]

@@ -180,7 +180,7 @@ class PatientWorld:
             kernel=_address(self.movement.kernel), movement=np.zeros(self.movement.size(self.duration)),
             starts=signals.t[first:end], coefficients=signals.c[first:end], course=np.zeros((n, 3)),
             horizons=np.array(self.task.preview, float), preview=np.zeros((n, len(self.task.preview))),
-            loads=np.zeros(n), needed=np.zeros(n), lacking=np.zeros(n), scale=np.zeros(1),
+            loads=np.zeros(n), needed=np.zeros(n), able=np.zeros(n), lacking=np.zeros(n), scale=np.zeros(1),
         )  # fmt: skip
 
     def _task(self) -> TaskTables:

@@ -9,7 +9,8 @@ from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.patient.ability import SMALLEST_SCALE, Need, ability, put_lacking, voluntary
+from exo_env.envs.hidden_intent import HiddenIntentEnv
+from exo_env.patient.ability import SMALLEST_SCALE, Need, ability, lacking_when, put_lacking, voluntary
 from exo_env.patient.motor_command import InternalModel, plan_course
 from exo_env.patient.patient import MIDDLE, Patient
 from exo_env.tasks.repetition import Repetition
@@ -27,10 +28,8 @@ def known(patient=None, load=1.0):
 def need(patient, model, course):
     """Need of a movement."""
     lacking, weights = np.zeros(len(course)), np.full(len(course), model.load.weight)
-    link = DEVICE.lower_link.numbers()
-    found, scale = put_lacking(
-        patient.row(), model.arm, model.load, weights, link, course, np.zeros(len(course)), lacking
-    )
+    link, needed, ratio = DEVICE.lower_link.numbers(), np.zeros(len(course)), np.zeros(len(course))
+    found, scale = put_lacking(patient.row(), model.arm, model.load, weights, link, course, needed, ratio, lacking)
     return Need(found, lacking, scale)
 
 
@@ -124,3 +123,28 @@ def test_populations_hold_patients_of_all_abilities():
     # 65 % below 1 of 150 were measured; the standard error of 60 is 6 %.
     assert 0.4 < (found["stroke_severe"] < 1.0).mean() < 0.9
     assert 0.02 < (found["evaluation"] < 0.2).mean() < 0.4 and (found["evaluation"] >= 0.2).mean() > 0.6
+
+
+def test_who_tires_lacks_more():
+    # Of 4 Nm that are needed somebody who could give 1.5 times that gives all until a third has tired.
+    assert lacking_when(0.5, 4.0, 1.5, 1.0) == 0.5 and lacking_when(0.5, 4.0, 1.5, 0.7) == 0.5
+    assert lacking_when(0.5, 4.0, 1.5, 0.5) == pytest.approx(0.5 + 0.25 * 4.0)
+    # Half of the need, then half of that; and more than at the start where fatigue has passed.
+    assert lacking_when(2.5, 4.0, 0.5, 0.5) == pytest.approx(2.5 + 1.0)
+    assert lacking_when(2.5, 4.0, 0.5, 1.2) == pytest.approx(2.5 - 0.4)
+    assert lacking_when(0.5, -1.0, 0.5, 0.5) == 0.5, "what falls by itself needs nobody"
+
+
+def test_a_tired_patient_is_helped_for_nothing():
+    """Over a minute with a patient who tires quickly, what is lacking grows with the fatigue of the flexors."""
+    env = HiddenIntentEnv(repetitions=4, patient={"fatigue_rate": 0.1, "recovery_rate": 0.0}, load=2.0)
+    env.reset(seed=3)
+    found = []
+    for _ in range(env.steps):
+        if env.step(np.array([0.0, -1.0]))[2]:
+            break
+        found.append(env.readings())
+    plan, k = env.world.tables.plan, len(found)
+    assert found[-1]["fatigued.BIClong"] > 0.3
+    assert found[-1]["lacking_moment"] > plan.lacking[k] or plan.needed[k] <= 0.0 or plan.able[k] > 1.5
+    assert all(r["lacking_moment"] >= x - 1e-12 for r, x in zip(found, plan.lacking[1:], strict=False))

@@ -48,7 +48,7 @@ def test_what_occurs_is_what_was_asked_for():
     rows = [movement.draw(key, TIME) for key in KEYS]
     units = [units_of(movement, row) for row in rows]
     starts = np.array([row[0] for row in rows])
-    assert 20.0 <= starts.min() < 21.0 and 39.0 < starts.max() <= 40.0
+    assert LOWEST <= starts.min() < LOWEST + 1.0 and HIGHEST - 1.0 < starts.max() <= HIGHEST
     rests = np.array([u[0, UNIT.onset] for u in units])
     assert 0.2 <= rests.min() < 0.3 and 2.9 < rests.max() <= 3.0
     overlapping = sum(int((u[1:, UNIT.onset] < u[:-1, UNIT.onset] + u[:-1, UNIT.duration] - 1e-9).sum()) for u in units)
@@ -66,6 +66,19 @@ def test_one_distribution_moves_no_other():
     row, other = (Intentions(pause=p).draw(KEYS[3], TIME) for p in (0.5, 0.6))
     assert row[0] == other[0] and row[1 + UNIT.onset] == other[1 + UNIT.onset]
     assert row[1 + UNIT.amplitude_deg] == other[1 + UNIT.amplitude_deg]
+
+
+def test_the_time_says_nothing_about_the_plan():
+    """The mean of psi over plans is the same at all times, within four standard errors of 400 plans."""
+    movement, times = Intentions(), np.linspace(0.0, TIME, 46)
+    psi = []
+    for key in KEYS:
+        row = movement.draw(key, TIME)
+        x = np.clip((times[:, None] - units_of(movement, row)[:, 0]) / units_of(movement, row)[:, 1], 0.0, 1.0)
+        psi.append(row[0] + (x**3 * (10.0 - 15.0 * x + 6.0 * x**2)) @ units_of(movement, row)[:, 2])
+    mean = np.mean(psi, axis=0)
+    assert np.abs(mean - mean.mean()).max() < 4.0 * np.std(psi) / math.sqrt(len(KEYS))
+    assert np.var(mean) < 0.01 * np.var(psi)
 
 
 def move(**changed):
