@@ -6,8 +6,12 @@ python -m agents tune-baselines [--tries N] [--patients N] [--workers N] [--out 
 python -m agents train --config FILE [--seed S] [--set KEY=VALUE ...] [--out DIR] | --resume DIR
 python -m agents export RUN --out DIR
 python -m agents report RUN [RUN ...] --out DIR
-python -m agents sweep --configs FILE [FILE ...] --seeds S [S ...] --out DIR
+python -m agents sweep --configs FILE [FILE ...] | --variations FILE --seeds S [S ...] --out DIR
+python -m agents ablations --variations FILE --runs DIR --seeds S [S ...] --out DIR
+python -m agents shift --policy NAME [NAME ...] --out DIR [--shifts NAME ...] [--patients N] [--workers N]
+python -m agents adaptation --policy NAME [NAME ...] --out DIR [--patients N] [--tries N] [--workers N]
 python -m agents upper-bound --out FILE.csv
+python -m agents hindsight --out FILE.csv [--patients N] [--tries N] [--workers N]
 python -m agents picture --policy A B --patient NAME --seed S --out FILE.png
 python -m agents video --policy A B --patient NAME --out FILE.mp4
 
@@ -21,10 +25,14 @@ import sys
 
 from dms_core.command_line import run_command
 
+from .commands.ablations import ablations
+from .commands.adaptation import adaptation
 from .commands.evaluate import evaluate, policies
 from .commands.export import export
+from .commands.hindsight import hindsight
 from .commands.picture import picture
 from .commands.report import report
+from .commands.shift import shift
 from .commands.sweep import sweep
 from .commands.train import train
 from .commands.tune_baselines import tune_baselines
@@ -43,8 +51,12 @@ def main(arguments: list[str] | None = None) -> int:
             "export": export,
             "report": report,
             "sweep": sweep,
+            "ablations": ablations,
+            "shift": shift,
+            "adaptation": adaptation,
             "tune-baselines": tune_baselines,
             "upper-bound": upper_bound,
+            "hindsight": hindsight,
             "picture": picture,
             "video": video,
         },

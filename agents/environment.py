@@ -16,14 +16,16 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 import exo_env  # noqa: F401  Importing it registers its environments.
 from dms_core.errors import InputError
+from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.lookup import environment_id, environments, spec_of
+from exo_env.tasks.task import Task
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
 __all__ = (
-    "ENVIRONMENT", "PROGRAM", "check_settings", "environment_id", "environments", "make", "make_sb3_worlds",
-    "make_vector", "patient_seeds", "spec_of",
+    "ENVIRONMENT", "PROGRAM", "check_settings", "environment_id", "environments", "hides_plan", "make",
+    "make_sb3_worlds", "make_vector", "patient_seeds", "spec_of", "task_type",
 )  # fmt: skip
 
 ENVIRONMENT = "exo/ElbowLift-v2"
@@ -55,6 +57,29 @@ def check_settings(environment: str, settings: Mapping[str, Any]) -> None:
     assert spec.entry_point is not None
     creator = spec.entry_point if callable(spec.entry_point) else load_env_creator(spec.entry_point)
     creator(**{**spec.kwargs, **settings}).close()
+
+
+def task_type(environment: str) -> type[Task]:
+    """The task of an environment.
+
+    Raises:
+        InputError: the id is not registered.
+    """
+    entry = spec_of(environment).entry_point
+    creator = load_env_creator(entry) if isinstance(entry, str) else entry
+    if isinstance(creator, type) and issubclass(creator, AssistanceEnv):
+        return creator.task_type
+    made: Any = make(environment).unwrapped
+    return type(made.task)
+
+
+def hides_plan(environment: str) -> bool:
+    """Whether a policy is not to know what the patient wants, so that policies are compared by fair rules.
+
+    Raises:
+        InputError: the id is not registered.
+    """
+    return bool(task_type(environment).revealing)
 
 
 def make_vector(environment: str, num_envs: int, **settings: Any) -> VectorEnv:

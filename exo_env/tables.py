@@ -76,16 +76,20 @@ class DriveTables(NamedTuple):
 
 
 class PatientTables(NamedTuple):
-    """The patient in the device; m muscles, k control times."""
+    """The patient in the device, who acts at ticks of its own clock (patient/effort.py); m muscles, k ticks."""
 
     traits: Cleared
     """Numbers of the patient, at the places of PATIENT."""
     effort: EffortState
     """Effort, fatigue and the memories of delayed signals."""
+    ticks: Cleared
+    """Number of times that the patient has acted, shape (1,)."""
     wanted: Cleared
-    """Motor command at each control time, shape (k, m)."""
+    """Motor command at each tick, shape (k, m)."""
+    course: Cleared
+    """psi, its rate and its acceleration at each tick, shape (k, 3)."""
     excitations: Cleared
-    """Excitation of each muscle at the end of the last period [-], shape (m,)."""
+    """Excitation of each muscle at the next tick [-], shape (m,)."""
     felt: Cleared
     """What the patient feels of the elbow, at the places of FELT."""
     senses: Kept
@@ -158,7 +162,7 @@ class ObserverTables(NamedTuple):
     streams: Kept
     """Random stream of each component's noise, as a signed number, shape (n,)."""
     tremor: Cleared
-    """Standard normal numbers for the tremor, shape (k,)."""
+    """Standard normal numbers for the tremor, one for each tick of the patient."""
     noise: Cleared
     """Standard normal numbers for each component, shape (k, n)."""
     memory: Cleared

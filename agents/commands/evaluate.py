@@ -19,8 +19,9 @@ from exo_env.rendering.panels import require_matplotlib
 from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.evaluate import Plan, each_episode_of, results_of
 from ..evaluation.figure import draw
-from ..evaluation.tables import heading, left_out_lines, short_table, statistic, whole_table
-from ..policies.baselines import POLICIES
+from ..evaluation.opponents import with_opponents
+from ..evaluation.tables import gap_lines, heading, left_out_lines, short_table, statistic, whole_table
+from ..policies.baselines import FOLLOWING, POLICIES
 from ..policies.learned import find_policy, shipped_policies
 from ..policies.policy import Policy
 from .options import device_settings, different_policies, repeated
@@ -44,6 +45,8 @@ def evaluate(
 ) -> int:
     """Run policies on the same patients: a table, evaluation.json, evaluation.md and, with matplotlib, evaluation.png.
 
+    Where the patient's plan is hidden, the best classical policy with the same sensors and the oracle take part, too.
+
     Args:
         policy_names: one or more: names of the command `policies`, folders of trained ones, or module:Class.
         out: folder for the results; made where it is missing.
@@ -62,7 +65,7 @@ def evaluate(
         raise InputError("--policy: expected one or more names.")
     # First: it may be what registers the environment that a policy was trained in.
     environment_id(environment)
-    used = different_policies(policy_names)
+    used = with_opponents(different_policies(policy_names), environment)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     plan = Plan(population, patients, seed, loads, environment, settings)
     inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
@@ -71,7 +74,8 @@ def evaluate(
         write_json(out / EVALUATION, results)
         write_text(out / "evaluation.md", "\n".join(whole_table(results)))
         _draw(out / "evaluation.png", results)
-    print("\n".join([heading(results), statistic(results), *left_out_lines(results), "", short_table(results), ""]))
+    notes = [*gap_lines(results), *left_out_lines(results)]
+    print("\n".join([heading(results), statistic(results), *notes, "", short_table(results), ""]))
     print(f"written: {outputs.where(out)} (all measures: evaluation.md, all episodes: {EVALUATION})")
     return FAILED_RUN if outputs.failed else 0
 
@@ -143,8 +147,9 @@ def _draw(path: Path, results: dict[str, Any]) -> None:
 def policies() -> int:
     """List the policies that `evaluate` knows."""
     for name, kind in POLICIES.items():
-        print(f"{name:18} {kind.title}; action mode {kind.action_mode}, sees {', '.join(kind.observation)}")
+        where = "" if name in FOLLOWING else "where the plan is hidden: "
+        print(f"{name:20} {where}{kind.title}; action mode {kind.action_mode}, sees {', '.join(kind.observation)}")
     for name in shipped_policies():
         one = find_policy(name)
-        print(f"{name:18} {one.title}; action mode {one.action_mode}, sees {', '.join(one.observation)}")
+        print(f"{name:20} {one.title}; action mode {one.action_mode}, sees {', '.join(one.observation)}")
     return 0

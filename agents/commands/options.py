@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,9 @@ from dms_core.errors import InputError
 from dms_core.files.json_text import brief, parse_json
 
 from ..checkpoint import Store
+from ..distributed.cluster import connected
+from ..environment import hides_plan
+from ..evaluation.shares import ShareOut, processes
 from ..policies.learned import DESCRIPTION, SHIPPED, LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from ..policies.policy import Policy
 
@@ -36,6 +40,36 @@ def _identity(name: str, one: Policy) -> Any:
         return type(one)
     folder = SHIPPED / name if name in shipped_policies() else Path(name)
     return (folder if (folder / DESCRIPTION).is_file() else Store(folder / "best").latest()).resolve()
+
+
+def check_hides_plan(environment: str, usual: str) -> None:
+    """Refuse an environment whose task hides nothing.
+
+    Args:
+        environment: its id.
+        usual: id of one that would be right.
+
+    Raises:
+        InputError: names the option.
+    """
+    if not hides_plan(environment):
+        raise InputError(f"--env {environment}: expected one whose task hides the patient's plan, such as {usual}.")
+
+
+@contextlib.contextmanager
+def sharing_out(workers: int, address: str | None) -> Iterator[ShareOut]:
+    """What does the shares of a long work, for the options --workers and --address.
+
+    Args:
+        workers: processes of this machine.
+        address: of a Ray cluster, or 'local' for one of this machine; without it there are processes.
+    """
+    if address is None:
+        with processes(workers) as share_out:
+            yield share_out
+    else:
+        with connected(None if address == "local" else address, workers) as share_out:
+            yield share_out
 
 
 def device_settings(exoskeleton: str | None) -> dict[str, Any]:

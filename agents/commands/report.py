@@ -132,7 +132,7 @@ def _shown(
     evaluated = evaluations[0]["policies"] if evaluations else {}
     ranked = sorted(evaluated, key=lambda n: evaluated[n]["summary"]["return"]["value"], reverse=True)
     learned = [n for n in ranked if n not in POLICIES] + [str(path) for path, curve in trainings.items() if curve]
-    baselines = [n for n in ranked if n in POLICIES] + ["pid", "none"]
+    baselines = [n for n in ranked if n in POLICIES and not POLICIES[n].informed] + ["pid", "none"]
     shown: list[Policy] = []
     for name in dict.fromkeys([*learned[:1], *baselines]):
         # The folder of a policy that was evaluated may be gone.

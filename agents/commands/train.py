@@ -19,7 +19,7 @@ from dms_core.errors import InputError, Stopped
 
 from ..environment import PROGRAM, environment_id
 from ..evaluation.episode import judged
-from ..training.usable import checked_config, require_training
+from ..training.usable import check_other_policies, checked_config, require_training
 
 BAR = "{percentage:3.0f}% |{bar}| {n_fmt} of {total_fmt} steps, {rate_fmt}, {elapsed} passed, {remaining} left"
 
@@ -106,6 +106,8 @@ def _begun(
     # A mistake shall not leave a folder behind.
     used = checked_config(config, changes, environment)
     folder = RunFolder(out or Path("out/training") / f"{used.training.algorithm}_{seed}")
+    used = used.placed(folder.path, seed)
+    check_other_policies(used)
     folder.check_new()
     with folder.locked():
         folder.begin(used, seed)

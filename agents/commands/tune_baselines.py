@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import csv
-import io
 import shlex
 import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from tqdm import tqdm
@@ -18,14 +14,14 @@ from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
 from dms_core.errors import Stopped, printable
 from dms_core.files.output_file import write_text
-from dms_core.files.outputs import OutputFile, Outputs, partial
+from dms_core.files.outputs import OutputFile, Outputs
 
-from ..environment import ENVIRONMENT, PROGRAM
-from ..evaluation.tuning import MEASURED, POPULATION, Try, tunable, tune
-from ..policies.tuned import FILE
-from .options import device_settings
-
-TRIES = "baselines_tries.csv"
+from ..environment import ENVIRONMENT, PROGRAM, hides_plan
+from ..evaluation.opponents import RETURNS
+from ..evaluation.tries import KeptTries, Try, beside, table
+from ..evaluation.tuning import POPULATION, tunable, tune, untuned
+from ..policies.tuned import FILE, HIDDEN_INTENT
+from .options import device_settings, sharing_out
 
 
 def tune_baselines(
@@ -35,12 +31,15 @@ def tune_baselines(
     seed: int = 0,
     repetitions: int = 1,
     workers: int = 1,
+    address: str | None = None,
     out: FolderOut | None = None,
     environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
     exoskeleton: str | None = None,
     overwrite: bool = False,
 ) -> int:
     """Search the baselines' numbers for the best mean return on the training population.
+
+    Tries are kept in the file ..._tries.partial.csv as they are done. After a stop the same command goes on from there.
 
     Args:
         tries: of each policy, half of them spread over its ranges and half around the best.
@@ -49,31 +48,52 @@ def tune_baselines(
         seed: of the patients and of the search.
         repetitions: of the movement in an episode.
         workers: processes.
-        out: folder of baselines.yml, which the policies read, and of the table of tries; default: where they read it.
-        environment: in which, by id.
+        address: of a Ray cluster that does the tries, or 'local' for one of this machine; processes where not given.
+        out: folder of the numbers, which the policies read, and of the table of tries; default: where they read it.
+        environment: in which, by id; its policies are tuned.
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
         overwrite: replace files of these names.
     """
-    folder = (configs() / FILE).parent if out is None else out
-    best, table = folder / Path(FILE).name, folder / TRIES
+    hidden = hides_plan(environment)
+    found = configs() / (HIDDEN_INTENT if hidden else FILE)
+    best = (found.parent if out is None else out) / found.name
+    every = best.with_name(f"{best.stem}_tries.csv")
     settings = device_settings(exoskeleton)
     command = f"{PROGRAM} tune-baselines --tries {tries} --patients {patients} --seed {seed}"
     command += _further(population, repetitions, environment, exoskeleton)
-    best_first: dict[str, list[Try]] = {}
-    files = [OutputFile("--out", best), OutputFile("--out", table)]
+    head = f"{command}; means over the patients"
+    files, best_first = [OutputFile("--out", best), OutputFile("--out", every)], dict[str, list[Try]]()
     with Outputs("tune-baselines", files=files, inputs=[population, exoskeleton], overwrite=overwrite) as outputs:
-        tried = _Tried(tries, table, command)
-        with tried.kept_when_stopped(outputs):
-            for name in tunable():
-                best_first[name] = tune(
-                    name, tries, patients, seed, population=population, workers=workers, progress=tried.add,
-                    environment=environment, repetitions=repetitions, **settings,
-                )  # fmt: skip
-        write_text(best, _yaml(best_first, population, command))
-        write_text(table, _table(best_first, command))
+        kept, names = KeptTries(beside(every), head), tunable(environment)
+        total = len(names) * tries
+        common = {"population": population, "environment": environment, "repetitions": repetitions, **settings}
+        try:
+            with sharing_out(workers, address) as share_out, _bar(total, kept.count) as bar:
+
+                def progress(one: Try) -> None:
+                    kept.add(one)
+                    bar.set_description(one.policy)
+                    bar.update()
+
+                for name in names:
+                    known = list(kept.done.get(name, ()))
+                    best_first[name] = tune(
+                        name, tries, patients, seed, share_out=share_out, known=known, progress=progress, **common
+                    )
+                others = untuned(patients, seed, **common) if hidden else {}
+        except KeyboardInterrupt:
+            if not kept.count:
+                raise
+            said = f"{kept.count} of {total} tries are in '{kept.path}'; the same command goes on from there."
+            raise Stopped(said) from None
+        write_text(best, _yaml(best_first, others, population, command, every.name))
+        write_text(every, table(best_first, head))
+        kept.remove()
     for name, ranked in best_first.items():
-        print(f"{name:18} return {ranked[0].measures['return']:.1f}  {ranked[0].numbers}")
-    print(f"written: {outputs.moved or folder}")
+        print(f"{name:20} return {ranked[0].measures['return']:.1f}  {ranked[0].numbers}")
+    for name, returned in others.items():
+        print(f"{name:20} return {returned:.1f}")
+    print(f"written: {outputs.moved or best.parent}")
     return FAILED_RUN if outputs.failed else 0
 
 
@@ -85,62 +105,25 @@ def _further(population: str, repetitions: int, environment: str, exoskeleton: s
     return options + (f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else "")
 
 
-class _Tried:
-    """Tries as they are done, with a bar.
-
-    Args:
-        tries: of each policy.
-        table: file of all tries.
-        command: as it stands in the table.
-    """
-
-    def __init__(self, tries: int, table: Path, command: str) -> None:
-        self.total, self.table, self.command = len(tunable()) * tries, table, command
-        self.done: dict[str, list[Try]] = {}
-        self.bar = tqdm(total=self.total, unit="try", leave=False, disable=None, file=sys.stderr)
-
-    def add(self, one: Try) -> None:
-        """One more."""
-        self.done.setdefault(one.policy, []).append(one)
-        self.bar.set_description(one.policy)
-        self.bar.update()
-
-    @contextlib.contextmanager
-    def kept_when_stopped(self, outputs: Outputs) -> Iterator[None]:
-        """Within, Ctrl-C writes the tries so far."""
-        try:
-            with self.bar:
-                yield
-        except KeyboardInterrupt:
-            if not self.done:
-                raise
-            write_text(part := partial(self.table), _table(self.done, self.command))
-            count = sum(map(len, self.done.values()))
-            raise Stopped(f"{count} of {self.total} tries are in '{outputs.where(part)}'.") from None
+def _bar(total: int, done: int) -> tqdm:
+    """A bar with the time that is left, where somebody looks."""
+    return tqdm(total=total, initial=done, unit="try", leave=False, disable=None, file=sys.stderr)
 
 
-def _yaml(tries: dict[str, list[Try]], population: str, command: str) -> str:
-    """Best numbers of each policy, with where they are from."""
+def _yaml(
+    tries: Mapping[str, Sequence[Try]], others: Mapping[str, float], population: str, command: str, every: str
+) -> str:
+    """Best numbers of each policy, with where they are from; where opponents are chosen, the returns of all, too."""
     lines = [
         f"# Numbers of the baselines with the best mean return on '{printable(population)}', found by",
         f"#   {printable(command)}",
-        f"# All tries stand in {TRIES}.",
+        f"# All tries stand in {every}.",
     ]
     for name, ranked in tries.items():
         lines.append(f"{name}:")
         lines += [f"  {key}: {value}" for key, value in ranked[0].numbers.items()]
+    if others:
+        returns = {**others, **{name: ranked[0].measures["return"] for name, ranked in tries.items()}}
+        lines += ["# Mean return on these patients, by which opponents and the oracle are chosen.", f"{RETURNS}:"]
+        lines += [f"  {name}: {returned:.4f}" for name, returned in sorted(returns.items(), key=lambda x: -x[1])]
     return "\n".join(lines) + "\n"
-
-
-def _table(tries: dict[str, list[Try]], command: str) -> str:
-    """All tries, best first."""
-    text = io.StringIO()
-    text.write(f"# {printable(command)}; means over the patients\n")
-    rows = csv.writer(text, lineterminator="\n")
-    known = [m for m in MEASURED if all(m in one.measures for ranked in tries.values() for one in ranked)]
-    rows.writerow(["policy", *known, "numbers"])
-    for name, ranked in tries.items():
-        for one in ranked:
-            numbers = " ".join(f"{key}={value:g}" for key, value in one.numbers.items())
-            rows.writerow([name, *(f"{one.measures[m]:.4g}" for m in known), numbers])
-    return text.getvalue()

@@ -24,6 +24,7 @@ from exo_env.rendering.scene import Scene
 
 from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.episode import world_of
+from ..evaluation.fair_play import begin, shown
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
 from .options import device_settings, different_policies, repeated
@@ -114,7 +115,7 @@ class Stage:
         self.policy = policy
         self.env = world_of(policy, population(patient).model_dump(), environment, render_mode="rgb_array", **settings)
         self.observation, self.info = self.env.reset(seed=seed)
-        policy.reset(self.env)
+        begin(policy, self.env)
         world: Any = self.env.unwrapped
         self.rate, self.length = round(1.0 / world.period), round(world.duration / world.period) + 1
         self.scenes: list[Scene] = [world.scene()]
@@ -125,7 +126,7 @@ class Stage:
         world: Any = self.env.unwrapped
         over = False
         while not over:
-            action = self.policy(self.observation, self.info)
+            action = self.policy(self.observation, shown(self.info, self.env))
             self.observation, _, terminated, truncated, self.info = self.env.step(action)
             self.scenes.append(world.scene())
             over = terminated or truncated

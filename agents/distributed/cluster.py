@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,19 +50,59 @@ def share_out(
     Raises:
         DmsError: Ray is missing or cannot be reached, a call failed, or a share lost its worker too often.
     """
+    with _cluster(address, cpus) as ray:
+        results: list[Any] = [None] * len(shares)
+        for k, result in _each(ray, function, shares, waiting):
+            results[k] = result
+            done(k)
+        return results
+
+
+@contextlib.contextmanager
+def connected(address: str | None, cpus: int | None = None) -> Iterator[Callable[..., Iterator[Any]]]:
+    """A cluster for several rounds of shares: a function that does shares and gives what comes of each, in order.
+
+    Args:
+        address: as in `share_out`.
+        cpus: of a local one.
+
+    Raises:
+        DmsError: as `share_out`.
+    """
+    with _cluster(address, cpus) as ray:
+
+        def each(function: Callable[..., Any], shares: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+            results: dict[int, Any] = {}
+            given = 0
+            for k, result in _each(ray, function, shares):
+                results[k] = result
+                while given in results:
+                    yield results.pop(given)
+                    given += 1
+
+        yield each
+
+
+def _each(
+    ray: Any, function: Callable[..., Any], shares: Sequence[tuple[Any, ...]],
+    waiting: Callable[[], None] = lambda: None,
+) -> Iterator[tuple[int, Any]]:  # fmt: skip
+    """Number and result of each share, as they are done."""
+    remote = ray.remote(num_cpus=1, max_retries=RETRIES)(function)
+    running = {remote.remote(*share): k for k, share in enumerate(shares)}
+    while running:
+        ready, _ = ray.wait(list(running), timeout=POLL)
+        for one in ready:
+            yield running.pop(one), ray.get(one)
+        waiting()
+
+
+@contextlib.contextmanager
+def _cluster(address: str | None, cpus: int | None) -> Iterator[Any]:
+    """Ray, connected within; its errors, and those of workers, become ours."""
     ray = _started(address, cpus)
     try:
-        remote = ray.remote(num_cpus=1, max_retries=RETRIES)(function)
-        running = {remote.remote(*share): k for k, share in enumerate(shares)}
-        results: list[Any] = [None] * len(shares)
-        while running:
-            ready, _ = ray.wait(list(running), timeout=POLL)
-            for one in ready:
-                k = running.pop(one)
-                results[k] = ray.get(one)
-                done(k)
-            waiting()
-        return results
+        yield ray
     except ray.exceptions.RayTaskError as error:
         raise DmsError(str(error.cause) if isinstance(error.cause, DmsError) else f"a worker failed: {error}") from None
     except ray.exceptions.RayError as error:

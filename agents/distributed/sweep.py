@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dms_core.errors import InputError
 
 from ..training.config import Config
+from ..training.config_file import TRAINING
 from ..training.records import RECORD, read_curve
 from ..training.run_folder import RunFolder
 from ..training.usable import checked_config
+from .variations import Variation, folder_of
 
 
 def planned(
@@ -19,22 +22,61 @@ def planned(
     changes: tuple[str, ...],
     out: Path,
     environment: str | None = None,
+    variations: Sequence[Variation] = (),
 ) -> list[tuple[dict[str, Any], int, str]]:
     """Configuration, seed and folder of each training.
+
+    Args:
+        configs: files, each trained as it is.
+        seeds: of the trainings.
+        changes: values that replace those of all configurations.
+        out: folder of the trainings.
+        environment: id of the section to take of each file.
+        variations: further configurations with changes of their own.
 
     Raises:
         InputError: a configuration is wrong, or two trainings would share a folder.
     """
-    if not configs or not seeds or min(seeds) < 0:
+    everyone = [*(Variation(path.stem, path) for path in configs), *variations]
+    if not everyone or not seeds or min(seeds) < 0:
         raise InputError("expected one or more configurations, and seeds from 0.")
     shares = []
-    for path in configs:
-        config = checked_config(path, changes, environment)
-        shares += [(config.content(), seed, str(out.resolve() / f"{path.stem}_{seed}")) for seed in seeds]
+    for one in everyone:
+        try:
+            config = checked_config(one.config, (*one.changes, *changes), environment)
+        except InputError as error:
+            raise InputError(f"variation '{one.name}': {error}" if one.changes else str(error)) from None
+        for seed in seeds:
+            folder = folder_of(out, one.name, seed)
+            shares.append((config.placed(folder, seed).content(), seed, str(folder)))
     folders = [folder for _, _, folder in shares]
     if len(set(folders)) < len(folders):
         raise InputError("two trainings would share a folder; give different seeds, and files of different names.")
     return shares
+
+
+def in_order(shares: list[tuple[dict[str, Any], int, str]]) -> list[list[tuple[dict[str, Any], int, str]]]:
+    """Trainings in groups: those of a group learn from others, as teacher or to begin with, of earlier groups only.
+
+    Raises:
+        InputError: trainings wait for each other.
+    """
+    groups, left = [], list(shares)
+    while left:
+        waiting = {folder for _, _, folder in left}
+        group = [share for share in left if not _named_in(share[0]) & waiting]
+        if not group:
+            raise InputError(f"these trainings wait for each other: {', '.join(sorted(waiting))}.")
+        groups.append(group)
+        left = [share for share in left if share not in group]
+    return groups
+
+
+def _named_in(content: dict[str, Any]) -> set[str]:
+    """Policies that a training learns from."""
+    training = content[TRAINING]
+    teacher = (training.get("imitation") or {}).get("teacher")
+    return {name for name in (teacher, training.get("initial")) if name is not None}
 
 
 def train_share(content: dict[str, Any], seed: int, folder: str) -> dict[str, Any]:

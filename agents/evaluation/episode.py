@@ -11,8 +11,10 @@ from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.patient.population import Source
 from exo_env.tasks.repetition import MOVED, Repetition, Repetitions
 
-from ..environment import ENVIRONMENT, make
+from ..environment import ENVIRONMENT, make, task_type
+from ..policies.learned import LearnedPolicy
 from ..policies.policy import Policy
+from .fair_play import begin, check_fair, shown
 from .measures import Record, left_out, measured
 
 ABOUT = ("load", "ability", "reference", "patient")
@@ -27,10 +29,17 @@ def world_of(policy: Policy, patient: Source, environment: str = ENVIRONMENT, **
         patient: population or patient.
         environment: its id.
         settings: further ones of the environment.
+
+    Raises:
+        InputError: the policy was trained for another task, or sees what it may not (fair_play.py).
     """
-    return make(
+    if isinstance(policy, LearnedPolicy):
+        policy.check_task(task_type(environment))
+    env = make(
         environment, patient=patient, action_mode=policy.action_mode, observation=list(policy.observation), **settings
     )
+    check_fair(policy, env)
+    return env
 
 
 def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> dict[str, Any]:
@@ -46,25 +55,35 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
         "measures", "event", which ended it or None, what `info` of the reset says of patient, load and movement, and
         "left_out", the measures that the environment does not allow.
     """
-    world: Any = env.unwrapped
-    observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
-    info = drawn
-    acting.reset(env)
-    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
-    record.add(world.readings())
-    over = False
-    while not over:
-        observation, reward, terminated, truncated, info = env.step(acting(observation, info))
-        record.add_step(float(reward), info)
-        record.add(world.readings())
-        over = terminated or truncated
-    record.event = info.get("event")
+    drawn, record = recorded(env, acting, seed, load)
     return {
         **{k: drawn[k] for k in ABOUT if k in drawn},
         "event": record.event,
         "measures": measured(record),
         "left_out": left_out(record),
     }
+
+
+def recorded(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> tuple[dict[str, Any], Record]:
+    """Run one episode; arguments as of `episode`.
+
+    Returns:
+        `info` of the reset, and the episode's record.
+    """
+    world: Any = env.unwrapped
+    observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
+    info = drawn
+    begin(acting, env)
+    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
+    record.add(world.readings())
+    over = False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(acting(observation, shown(info, env)))
+        record.add_step(float(reward), info)
+        record.add(world.readings())
+        over = terminated or truncated
+    record.event = info.get("event")
+    return drawn, record
 
 
 def judged(env: gymnasium.Env, acting: Policy, seeds: Sequence[int]) -> list[dict[str, Any]]:

@@ -19,15 +19,18 @@ from dms_core.validation import shown
 from exo_env.patient.ability import ABLE
 from exo_env.patient.population import Source, population
 
-from ..environment import ENVIRONMENT, environment_id, patient_seeds
+from ..environment import ENVIRONMENT, environment_id, hides_plan, patient_seeds
 from ..policies.policy import Policy
+from .by_patient import by_patient, by_training
 from .episode import episode, world_of
+from .gap import GAP, gaps
 from .measures import measures_among
+from .opponents import opponent_of, oracle_name, with_opponents
 from .statistics import CONFIDENCE, RESAMPLES, estimate, interquartile_mean, mean
 
 COMPARED = ("return", "tracking_rms_deg", "device_work_share", "peak_reaction_N")
 """Measures whose differences between policies are estimated, patient by patient."""
-VERSION = 1
+VERSION = 2
 """Of what `evaluate` returns, which stands in evaluation.json."""
 Case = tuple[int, float | None]
 """Seed of an episode and its load [kg], None for the one that the seed draws."""
@@ -92,7 +95,7 @@ def evaluate(
     progress: Callable[[str], None] | None = None,
     **settings: Any,
 ) -> dict[str, Any]:
-    """Run every policy on the same patients, loads and repetitions.
+    """Run every policy on the same patients, loads and repetitions; see opponents.py for who takes part, too.
 
     Args:
         policies: to compare.
@@ -106,13 +109,15 @@ def evaluate(
 
     Returns:
         JSON-able: what was run, and by policy `episodes`, `summary`, an Estimate of each measure, and `summary_able`,
-        the same over the patients who can do something (ability of at least `able`).
+        the same over the patients who can do something (ability of at least `able`); both with `gap_closed` where the
+        task hides the patient's plan.
 
     Raises:
         InputError: the population or the environment is unknown, or a number is not usable.
     """
     plan = Plan(patients_of, patients, seed, tuple(loads), environment, settings)
-    return results_of(policies, [episodes_of(one, plan, plan.cases, progress) for one in policies], plan)
+    used = with_opponents(policies, environment)
+    return results_of(used, [episodes_of(one, plan, plan.cases, progress) for one in used], plan)
 
 
 def check_numbers(patients: int, seed: int) -> None:
@@ -160,12 +165,28 @@ def results_of(policies: Sequence[Policy], episodes: Sequence[list[dict[str, Any
             "summary_able": summary(able_ones(those), plan.seed, names=those[0]["measures"]),
             "difference": differences(those, episodes[0], plan.seed), "episodes": those,
         }  # fmt: skip
+        by_name[one.name] |= {"informed": True} if one.informed else {}
+    _add_gaps(policies, by_name, plan)
     return {
         "version": VERSION, "environment": plan.id, "population": plan.title, "patients": plan.patients,
         "loads": list(plan.loads), "seed": plan.seed, "settings": dict(plan.settings),
         "statistic": "interquartile mean", "confidence": CONFIDENCE, "resamples": RESAMPLES, "able": ABLE,
         "left_out": left, "policies": by_name,
     }  # fmt: skip
+
+
+def _add_gaps(policies: Sequence[Policy], by_name: Mapping[str, Any], plan: Plan) -> None:
+    """Add the gap closed to both summaries of each policy whose opponent and oracle took part."""
+    if not hides_plan(plan.id):
+        return
+    oracle, opponents = oracle_name(), {one.name: opponent_of(one) for one in policies}
+    # An evaluation that was stopped may lack them.
+    known = {name for name, other in opponents.items() if {other, oracle} <= by_name.keys()}
+    for kind, kept in (("summary", list), ("summary_able", able_ones)):
+        episodes = {name: kept(one["episodes"]) for name, one in by_name.items()}
+        if all(episodes.values()):
+            for name, gap in gaps(episodes, {n: opponents[n] for n in known}, oracle, plan.seed).items():
+                by_name[name][kind][GAP] = gap
 
 
 def summary(
@@ -187,20 +208,6 @@ def summary(
             estimate(values, mean if m.rate else interquartile_mean, np.random.default_rng(seed))
         )
     return estimates
-
-
-def by_patient(episodes: list[dict[str, Any]], measure: str) -> np.ndarray:
-    """Mean of a measure over the episodes of each patient, shape (n,); NaN where it could not be measured."""
-    values: dict[int, list[float | None]] = {}
-    for e in episodes:
-        values.setdefault(e["seed"], []).append(e["measures"][measure])
-    return np.array([np.mean([x for x in v if x is not None and np.isfinite(x)] or [np.nan]) for v in values.values()])
-
-
-def by_training(episodes: list[dict[str, Any]], measure: str, trainings: int) -> np.ndarray:
-    """`by_patient` of each training, shape (trainings, n)."""
-    n = len(episodes) // trainings
-    return np.array([by_patient(episodes[k * n : (k + 1) * n], measure) for k in range(trainings)])
 
 
 def differences(

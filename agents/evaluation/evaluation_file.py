@@ -1,6 +1,7 @@
 """What evaluation.json has to hold, and its reader: whatever passes here, tables and figures can be made of.
 
 The file says its version since version 1. Those from before hold the same and are read where they are complete.
+Version 2 has `gap_closed` in the summaries where the task hides the patient's plan, and says who was informed of it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dms_core.files.json_text import Each, brief, checked, read_json
 from dms_core.validation import Checked
 
 from .evaluate import VERSION
+from .gap import GAP
 
 BEFORE = "exo/ElbowLift-v0"
 """Environment of evaluations from before they said it."""
@@ -63,7 +65,16 @@ class EstimateFields(Checked):
         return self
 
 
+class SummaryFields(EstimateFields):
+    """An estimate, or the gap closed, which names whom it is between, or says why there is none."""
+
+    opponent: str | None = None
+    oracle: str | None = None
+    reason: str | None = None
+
+
 Summary = Annotated[dict[str, Any], Each(EstimateFields)]
+WholeSummary = Annotated[dict[str, Any], Each(SummaryFields)]
 
 
 class EpisodeFields(Checked):
@@ -83,8 +94,9 @@ class PolicyFields(Checked):
 
     title: str = Field(min_length=1, max_length=300)
     training: str | None = None
-    summary: Annotated[Summary, AfterValidator(_needed)]
-    summary_able: Summary = {}
+    informed: bool = Field(default=False, strict=True, description="it saw the patient's plan")
+    summary: Annotated[WholeSummary, AfterValidator(_needed)]
+    summary_able: WholeSummary = {}
     difference: Summary = {}
     episodes: Annotated[list[Any], Field(min_length=1), Each(EpisodeFields)]
 
@@ -146,5 +158,5 @@ def _check_cases(content: dict[str, Any], where: str) -> None:
         for k, one in enumerate(policy["episodes"]):
             if one["measures"].keys() != measures:
                 raise InputError(f"{who}: episodes: {k}: expected the measures of the first episode.")
-        if not policy["summary"].keys() <= measures:
+        if not policy["summary"].keys() - {GAP} <= measures:
             raise InputError(f"{who}: summary: expected measures of the episodes.")

@@ -87,6 +87,8 @@ class Measure:
     """Readings that it needs, TENSION and REPETITIONS among them."""
     rate: bool = False
     """The numbers are 0 or 1, whose mean says how many; their interquartile mean would hide the few."""
+    special: bool = False
+    """Only some tasks have it: where it is missing, nothing is left out."""
 
 
 def _tracking_rms(record: Record) -> float:
@@ -124,6 +126,10 @@ MEASURES = (
         ("elbow_reaction",),
     ),
     Measure("smoothness_sparc", "smoothness (SPARC)", "-", _smoothness, ("time", "elbow_angle.rate", REPETITIONS)),
+    Measure(
+        "opposing_power_W", "power against the patient", "W", lambda r: float(r.column("opposing_power").mean()),
+        ("opposing_power",), special=True,
+    ),
     Measure("unsafe", "unsafe episodes", "-", lambda r: float(r.event is not None), rate=True),
     Measure("solver_failures", "solver failures", "-", lambda r: float(r.solver_failed), rate=True),
     Measure("length_s", "length of the episode", "s", lambda r: len(r.rewards) * r.period),
@@ -140,7 +146,7 @@ def measured(record: Record) -> dict[str, float]:
 
 def left_out(record: Record) -> dict[str, list[str]]:
     """Measures that an environment does not allow, with the readings that it lacks."""
-    return {m.name: lacking for m in MEASURES if (lacking := record.lacks(m.reads))}
+    return {m.name: lacking for m in MEASURES if not m.special and (lacking := record.lacks(m.reads))}
 
 
 def measures_among(names: Iterable[str]) -> list[Measure]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .evaluate import able_ones, summary
+from .gap import GAP, pooled_gap
 
 
 def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
@@ -30,4 +31,7 @@ def pooled(policies: Mapping[str, Any], seed: int) -> dict[str, Any]:
                     able_ones(episodes), seed, len(parts), episodes[0]["measures"]
                 ),
             }  # fmt: skip
+            for kind, kept in (("summary", list), ("summary_able", able_ones)):
+                gap = pooled_gap(ones, policies, kind, kept, seed)
+                together[title][kind] |= {GAP: gap} if gap else {}
     return together

@@ -15,12 +15,16 @@ from dms_core.files.output_file import markdown_cell
 from ..environment import ENVIRONMENT
 from ..policies.baselines import POLICIES
 from .evaluate import COMPARED, able_ones, differences
+from .gap import GAP
 from .measures import MEASURES, REPETITIONS, measures_among
 from .statistics import Estimate
 
 OF_THE_ABLE = ("return", "tracking_rms_deg", "device_work_share", "patient_work_share", "peak_reaction_N")
 """Measures that are printed of them."""
-SHORT = {"tracking_rms_deg": "tracking, rms [deg]", "device_work_share": "device's share of work"}
+SHORT = {
+    "tracking_rms_deg": "tracking, rms [deg]", "device_work_share": "device's share of work",
+    "opposing_power_W": "power against patient [W]",
+}  # fmt: skip
 """Measures of the short table beside the return, and their heads."""
 LEAST = 1e-6
 """Least number that is printed as one, in the unit of any measure; what is below is 0."""
@@ -29,7 +33,26 @@ LEAST = 1e-6
 def statistic(results: Mapping[str, Any]) -> str:
     """What the cells of a table are."""
     percent = 100.0 * results["confidence"]
-    return f"{results['statistic']} (means of differences and of unsafe episodes) [{percent:g} % bootstrap interval]"
+    means = "differences, of the gap closed" if _with_gap(results["policies"]) else "differences"
+    return f"{results['statistic']} (means of {means} and of unsafe episodes) [{percent:g} % bootstrap interval]"
+
+
+def gap_lines(results: Mapping[str, Any]) -> list[str]:
+    """Lines on what the gap is that policies close, and on why some have none; none where no plan is hidden."""
+    known = {name: gap for name, p in results["policies"].items() if (gap := p["summary"].get(GAP))}
+    if not known:
+        return []
+    between, reasons = dict[tuple[str, str], list[str]](), dict[str, list[str]]()
+    for name, gap in known.items():
+        between.setdefault((gap["opponent"], gap["oracle"]), []).append(name)
+        if gap["reason"]:
+            reasons.setdefault(gap["reason"], []).append(name)
+    said = "; ".join(f"from {a} to {b} for {', '.join(names)}" for (a, b), names in between.items())
+    told = ", ".join(name for name, p in results["policies"].items() if p.get("informed"))
+    return [
+        f"Gap closed: {said}. Opponent and oracle were chosen on training patients. Told the plan: {told or 'nobody'}.",
+        *(f"No gap for {', '.join(names)}: {reason}." for reason, names in reasons.items()),
+    ]
 
 
 def heading(results: Mapping[str, Any]) -> str:
@@ -42,16 +65,18 @@ def heading(results: Mapping[str, Any]) -> str:
 
 
 def short_table(results: Mapping[str, Any]) -> str:
-    """A row a policy: return, its difference to the first policy, tracking, device's share, unsafe episodes."""
+    """A row a policy: return, its difference to the first policy, gap closed, tracking, help, unsafe episodes."""
     names, policies = _short_names(results["policies"]), list(results["policies"].values())
     shown = {k: label for k, label in SHORT.items() if all(k in p["summary"] for p in policies)}
-    rows = [["", "return", f"difference to {names[0]}", *shown.values(), "unsafe"]]
+    gap = ["gap closed"] * _with_gap(results["policies"])
+    rows = [["", "return", f"difference to {names[0]}", *gap, *shown.values(), "unsafe"]]
     for name, p in zip(names, policies, strict=True):
-        returned, *others = (_cell(Estimate(**p["summary"][k])) for k in ("return", *shown))
-        compared = "" if name == names[0] else _cell(Estimate(**p["difference"]["return"]))
+        returned, *others = (cell(Estimate(**p["summary"][k])) for k in ("return", *shown))
+        compared = "" if name == names[0] else cell(Estimate(**p["difference"]["return"]))
         # A percentage would round a single one away.
         unsafe = f"{sum(e['measures']['unsafe'] for e in p['episodes']):.0f} of {len(p['episodes'])}"
-        rows.append([name, returned, compared, *others, unsafe])
+        closed = [gap_cell(p["summary"])] if gap else []
+        rows.append([name, returned, compared, *closed, *others, unsafe])
     if len(policies) == 1:
         rows = [[*row[:2], *row[3:]] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -93,7 +118,7 @@ def whole_table(results: Mapping[str, Any]) -> list[str]:
     head, *rows = ([markdown_cell(cell) for cell in row] for row in table_rows(results))
     return [
         f"## {printable(heading(results))}", "", f"{statistic(results).capitalize()}.",
-        *map(printable, left_out_lines(results)), "",
+        *map(printable, [*gap_lines(results), *left_out_lines(results)]), "",
         f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows), "",
     ]  # fmt: skip
 
@@ -104,8 +129,23 @@ def _rows(policies: Mapping[str, Any], summary: str, measures: Sequence[str]) ->
     for m in measures_among(measures):
         if all(m.name in p[summary] for p in policies.values()):
             label = m.label if m.unit == "-" else f"{m.label} [{m.unit}]"
-            rows.append([label, *(_cell(Estimate(**p[summary][m.name])) for p in policies.values())])
+            rows.append([label, *(cell(Estimate(**p[summary][m.name])) for p in policies.values())])
+        if m.name == "return" and summary != "d" and _with_gap(policies):
+            rows.append(["gap closed", *(gap_cell(p[summary]) for p in policies.values())])
     return rows
+
+
+def _with_gap(policies: Mapping[str, Any]) -> bool:
+    """Whether the gap closed is known of any policy."""
+    return any(GAP in p["summary"] for p in policies.values())
+
+
+def gap_cell(summary: Mapping[str, Any]) -> str:
+    """The gap closed, or a dash where there is none."""
+    gap = summary.get(GAP)
+    if gap is None or gap["reason"]:
+        return "-"
+    return cell(Estimate(gap["value"], gap["low"], gap["high"], gap["count"]))
 
 
 def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
@@ -131,12 +171,12 @@ def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
 
 
 def best_baseline(policies: Mapping[str, Any]) -> str | None:
-    """Name of the classical policy with the best return."""
-    known = [name for name in policies if name in POLICIES]
+    """Name of the classical policy with the best return; one that is told the plan is none."""
+    known = [name for name in policies if name in POLICIES and not POLICIES[name].informed]
     return max(known, key=lambda name: policies[name]["summary"]["return"]["value"], default=None)
 
 
-def _cell(e: Estimate) -> str:
+def cell(e: Estimate) -> str:
     """Value and interval; what is below `LEAST` is round-off, and 0."""
     value, low, high = (0.0 if abs(x) < LEAST else x for x in (e.value, e.low, e.high))
     return f"{_digits(value)} [{_digits(low)}, {_digits(high)}]"

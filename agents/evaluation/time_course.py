@@ -14,6 +14,7 @@ from exo_env.patient.population import Source, population
 from ..environment import ENVIRONMENT
 from ..policies.policy import Policy
 from .episode import movement_of, world_of
+from .fair_play import begin, shown
 from .measures import Record, measured
 
 READ = (
@@ -86,12 +87,12 @@ def time_course(
     env = world_of(policy, population(patient).model_dump(), environment, **settings)
     world: Any = env.unwrapped
     observation, drawn = env.reset(seed=seed, options=options)
-    policy.reset(env)
+    begin(policy, env)
     record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
     info, rows, over = drawn, [world.readings()], False
     record.add(rows[0])
     while not over:
-        observation, reward, terminated, truncated, info = env.step(policy(observation, info))
+        observation, reward, terminated, truncated, info = env.step(policy(observation, shown(info, env)))
         rows.append(world.readings())
         record.add_step(float(reward), info)
         record.add(rows[-1])

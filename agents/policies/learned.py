@@ -24,9 +24,10 @@ from dms_core.files.json_text import Each, brief, checked, finite, read_json
 from dms_core.files.output_file import write_bytes, write_text
 from dms_core.validation import Checked
 from exo_env.settings import Settings
+from exo_env.tasks.task import Task
 
 from ..checkpoint import Store
-from ..environment import PROGRAM, environment_id
+from ..environment import PROGRAM, environment_id, task_type
 from .baselines import POLICIES
 from .baselines import policy as baseline
 from .network import Architecture, Count, Network
@@ -84,13 +85,14 @@ class Description(Settings):
     architecture: Architecture
     steps: Count = Field(description="of training")
     seed: Count | None = None
+    informed: bool = Field(default=False, strict=True, description="saw what reveals the patient's plan")
     weights_sha256: str = ""
     sha256: str = Field(default="", description="of all other keys")
 
     @property
     def common(self) -> str:
         """A digest of all but steps, seed and weights: the same for trainings that differ in nothing but the seed."""
-        apart = {"format", "steps", "seed", "weights_sha256", "sha256", "title"}
+        apart = {"format", "steps", "seed", "informed", "weights_sha256", "sha256", "title"}
         facts = self.model_dump(mode="json", exclude=apart) | {"format": 1}  # as it was in format 1
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -111,6 +113,7 @@ def world_facts(env: gymnasium.Env) -> dict[str, Any]:
         "structure": tuple(parts),
         "period": world.period,
         "drive": world.drive.model_dump(mode="json"),
+        "informed": any(part.group in world.task.revealing for part in world.observation_structure),
     }
 
 
@@ -129,7 +132,7 @@ class LearnedPolicy(Policy):
         # A policy's own, where those of baselines are of the class.
         own: dict[str, Any] = {
             "name": name, "title": description.title, "action_mode": description.action_mode,
-            "observation": description.observation, "training": description.common,
+            "observation": description.observation, "training": description.common, "informed": description.informed,
         }  # fmt: skip
         self.__dict__.update(own)
 
@@ -166,7 +169,29 @@ class LearnedPolicy(Policy):
 
     def reset(self, env: gymnasium.Env) -> None:
         """Forget the last patient; an environment that the policy does not know is refused."""
+        self._check(env)
+        self.network.reset()
+
+    def begin(self, env: gymnasium.Env, n: int) -> None:
+        """Begin episodes in many worlds at once, for `act`.
+
+        Args:
+            env: one of their kind; one that the policy does not know is refused.
+            n: number of worlds.
+        """
+        self._check(env)
+        self.network.reset(n)
+
+    def act(self, observations: np.ndarray) -> np.ndarray:
+        """The actions held best in many worlds, shape (n, actions), after one more observation of each, (n, k)."""
+        return self.network(observations)
+
+    def _check(self, env: gymnasium.Env) -> None:
+        """Refuse an environment that shows or takes something else than that of the training."""
         facts, d = world_facts(env), self.description
+        if not self._known:
+            world: Any = env.unwrapped
+            self.check_task(type(world.task))
         mine, theirs = ([[part[k] for k in COMPARED] for part in parts] for parts in (d.structure, facts["structure"]))
         for what, trained, here in (
             ("observation", mine, theirs),
@@ -177,10 +202,29 @@ class LearnedPolicy(Policy):
             if trained != here:
                 difference = brief(f"{trained}, not {here}")
                 raise InputError(f"policy '{self.name}' was trained with another {what}: {difference}.")
-        self.network.reset()
         if not self._known:
             self._say_where(env)
         self._known = True
+
+    def check_task(self, task: type[Task]) -> None:
+        """Refuse another task where either of them hides the plan: what such a policy learned is of no use there.
+
+        Raises:
+            InputError: names both tasks.
+        """
+        if (self._task.revealing or task.revealing) and not _variants(self._task, task):
+            raise InputError(
+                f"policy '{self.name}' was trained for the task {self._task.__name__}, and this is {task.__name__}: "
+                "expected a policy that was trained for the same task."
+            )
+
+    def knows(self, environment: str) -> bool:
+        """Whether it was trained for the task of an environment, by its id."""
+        return _variants(self._task, task_type(environment))
+
+    @property
+    def _task(self) -> type[Task]:
+        return task_type(environment_id(self.description.environment, say=False))
 
     def _say_where(self, env: gymnasium.Env) -> None:
         """Say where an environment is another one that shows and takes the same: it may reward something else."""
@@ -201,6 +245,11 @@ class LearnedPolicy(Policy):
         if not self._known:
             raise InputError(f"policy '{self.name}' acts without a begin: call reset(env) after the environment's own.")
         return self.network(observation)
+
+
+def _variants(one: type[Task], other: type[Task]) -> bool:
+    """Whether two tasks are the same, or one a variant of the other, such as one with more windows."""
+    return issubclass(one, other) or issubclass(other, one)
 
 
 def _check_registered(environment: str) -> None:

@@ -114,23 +114,29 @@ class Network:
         self._activation = ACTIVATIONS[shape.activation]
         self.reset()
 
-    def reset(self) -> None:
-        """Forget what was seen."""
+    def reset(self, *worlds: int) -> None:
+        """Forget what was seen.
+
+        Args:
+            worlds: number of worlds that it acts in at once from now on; without it one, whose arrays have no axis for
+                worlds.
+        """
         s = self.shape
-        self._seen = np.zeros(s.inputs // (1 + len(s.traces)), dtype=np.float32)
+        self._observed = (*worlds, s.observed)
+        self._seen = np.zeros((*worlds, s.inputs // (1 + len(s.traces))), dtype=np.float32)
         self._memory: np.ndarray | None = None
-        self._action, self._left = np.zeros(s.outputs), 0
-        self._hidden = np.zeros((s.lstm_layers, s.lstm_width))
-        self._cell = np.zeros((s.lstm_layers, s.lstm_width))
+        self._action, self._left = np.zeros((*worlds, s.outputs)), 0
+        self._hidden = np.zeros((s.lstm_layers, *worlds, s.lstm_width))
+        self._cell = np.zeros((s.lstm_layers, *worlds, s.lstm_width))
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """The action that the policy holds best, shape (outputs,), after one more observation.
+        """The action that the policy holds best, shape (outputs,) or (worlds, outputs), after one more observation.
 
         Raises:
             InputError: the observation has not the shape of those in training.
         """
-        if observation.shape != (self.shape.observed,):
-            raise InputError(f"the observation has shape {observation.shape}: expected ({self.shape.observed},).")
+        if observation.shape != self._observed:
+            raise InputError(f"the observation has shape {observation.shape}: expected {self._observed}.")
         if self._left == 0:
             self._action, self._left = self._decided(observation), self.shape.hold
         self._left -= 1
@@ -138,14 +144,14 @@ class Network:
 
     def _decided(self, observation: np.ndarray) -> np.ndarray:
         """A new action."""
-        s, size = self.shape, observation.size
-        self._seen = np.concatenate([self._seen[size:], observation.astype(np.float32)])
+        s = self.shape
+        self._seen = np.concatenate([self._seen[..., s.observed :], observation.astype(np.float32)], axis=-1)
         x = self.normalise(self._remembered())
         for k in range(s.lstm_layers):
             x = self._lstm(k, x)
         last = len(s.hidden)
         for k in range(last + 1):
-            x = self._arrays[f"layer.{k}.weight"] @ x + self._arrays[f"layer.{k}.bias"]
+            x = x @ self._arrays[f"layer.{k}.weight"].T + self._arrays[f"layer.{k}.bias"]
             x = self._activation(x) if k < last else x
         return np.tanh(x) if s.output == "tanh" else np.clip(x, -1.0, 1.0)
 
@@ -153,10 +159,13 @@ class Network:
         """What is seen, followed by what the filters make of it."""
         if not self.shape.traces:
             return self._seen
+        seen = self._seen[..., None, :]
+        kept = np.array(self.shape.traces)[:, None]
         if self._memory is None:
-            self._memory = np.tile(self._seen, (len(self.shape.traces), 1)).astype(float)
-        self._memory += (1.0 - np.array(self.shape.traces)[:, None]) * (self._seen - self._memory)
-        return np.concatenate([self._seen, self._memory.ravel()], dtype=np.float32)
+            self._memory = np.repeat(seen, len(kept), axis=-2).astype(float)
+        self._memory += (1.0 - kept) * (seen - self._memory)
+        filtered = self._memory.reshape(*self._seen.shape[:-1], -1)
+        return np.concatenate([self._seen, filtered], axis=-1, dtype=np.float32)
 
     def normalise(self, seen: np.ndarray) -> np.ndarray:
         """What the first layer gets."""
@@ -169,9 +178,9 @@ class Network:
     def _lstm(self, k: int, x: np.ndarray) -> np.ndarray:
         """One cell of layer k (Hochreiter and Schmidhuber 1997, with forget gate), gates in PyTorch's order."""
         a, h, c = self._arrays, self._hidden[k], self._cell[k]
-        gates = a[f"lstm.{k}.input"] @ x + a[f"lstm.{k}.input_bias"]
-        gates = gates + a[f"lstm.{k}.state"] @ h + a[f"lstm.{k}.state_bias"]
-        enter, forget, new, leave = np.split(gates, 4)
+        gates = x @ a[f"lstm.{k}.input"].T + a[f"lstm.{k}.input_bias"]
+        gates = gates + h @ a[f"lstm.{k}.state"].T + a[f"lstm.{k}.state_bias"]
+        enter, forget, new, leave = np.split(gates, 4, axis=-1)
         c = sigmoid(forget) * c + sigmoid(enter) * np.tanh(new)
         h = sigmoid(leave) * np.tanh(c)
         self._hidden[k], self._cell[k] = h, c

@@ -7,10 +7,11 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import VectorEnv
 
 from dms_core.errors import InputError, choices
 
-from .tuned import Range
+from .tuned import FILE, Range
 
 
 class Policy(ABC):
@@ -30,6 +31,10 @@ class Policy(ABC):
     """Groups of the observation that it sees, or single channels as "group.channel"."""
     ranges: ClassVar[dict[str, Range]] = {}
     """Where its numbers may lie, which `python -m agents tune-baselines` searches; arguments of its constructor."""
+    tuned_in: ClassVar[str] = FILE
+    """File under configs/ with the numbers that were found."""
+    informed: ClassVar[bool] = False
+    """Whether it may see what reveals the patient's plan (`Task.revealing`), which makes it no fair competitor."""
 
     @abstractmethod
     def reset(self, env: gymnasium.Env) -> None:
@@ -37,11 +42,11 @@ class Policy(ABC):
 
     @abstractmethod
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
-        """The action, shape (2,).
+        """The action, shape (n,), each number from -1 to 1.
 
         Args:
             observation: of the environment.
-            info: of its last step or reset.
+            info: of its last step or reset; empty where the task has a plan to hide (`Task.revealing`).
         """
 
 
@@ -49,10 +54,10 @@ class Channels:
     """Readings in their units from an observation.
 
     Args:
-        env: whose observations are read.
+        env: whose observations are read; one environment, or many in a batch.
     """
 
-    def __init__(self, env: gymnasium.Env) -> None:
+    def __init__(self, env: gymnasium.Env | VectorEnv) -> None:
         world: Any = env.unwrapped
         self._slices = {f"{part.group}.{part.name}": part for part in world.observation_structure}
 
@@ -67,7 +72,31 @@ class Channels:
         Raises:
             InputError: the channel is not observed.
         """
+        part = self._part(name)
+        return float(observation[part.start + component]) * part.scale
+
+    def columns(self, observations: np.ndarray, name: str) -> np.ndarray:
+        """All components of a channel in many worlds [unit of the channel], shape (components, n).
+
+        Args:
+            observations: of n worlds, shape (n, k).
+            name: of the channel, as "group.channel".
+
+        Raises:
+            InputError: the channel is not observed.
+        """
+        part = self._part(name)
+        return observations[:, part.start : part.stop].T.astype(float) * part.scale
+
+    def labels(self, name: str) -> tuple[str, ...]:
+        """Label of each component of a channel.
+
+        Raises:
+            InputError: the channel is not observed.
+        """
+        return self._part(name).labels
+
+    def _part(self, name: str) -> Any:
         if name not in self._slices:
             raise InputError(f"the policy reads '{name}', which is not observed; there are {choices(self._slices)}.")
-        part = self._slices[name]
-        return float(observation[part.start + component]) * part.scale
+        return self._slices[name]

@@ -26,10 +26,13 @@ from torch import nn
 from dms_core.errors import InputError, choices
 from dms_core.validation import cut, shown
 
-from .config import OURS, Config
-from .critic import TwoViewPolicy, seen_places
+from .config import OURS, Config, Training
+from .critic import TwoViewLstmPolicy, TwoViewPolicy, seen_places
+from .dagger import Dagger
 
-ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "tqc": TQC, "recurrent_ppo": RecurrentPPO}
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
+    "ppo": PPO, "sac": SAC, "tqc": TQC, "recurrent_ppo": RecurrentPPO, "dagger": Dagger,
+}  # fmt: skip
 ACTIVATIONS: dict[str, type[nn.Module]] = {
     "tanh": nn.Tanh, "relu": nn.ReLU, "elu": nn.ELU, "silu": nn.SiLU, "leakyrelu": nn.LeakyReLU,
 }  # fmt: skip
@@ -38,8 +41,14 @@ NOT_GIVEN = (
     "optimize_memory_usage", "observation_space", "action_space", "lr_schedule", "full_std", "use_expln",
     "squash_output", "share_features_extractor", "normalize_images", "clip_mean", "use_sde_at_warmup",
     "rollout_buffer_kwargs", "replay_buffer_kwargs", "features_extractor_kwargs",
-    "optimizer_kwargs", "lstm_kwargs",
+    "optimizer_kwargs", "lstm_kwargs", "imitation", "decisions",
 )  # fmt: skip
+TWO_VIEWS: dict[tuple[str, str, int], type] = {
+    ("ppo", "MlpPolicy", 1): TwoViewPolicy, ("recurrent_ppo", "MlpLstmPolicy", 1): TwoViewLstmPolicy,
+}  # fmt: skip
+"""Policies whose critic sees more, by algorithm, policy and frame_stack."""
+REWARDED = ("start", "against", "critic", "held")
+"""Keys of `training` that do nothing where no reward is learned from."""
 STATE_DEPENDENT = {"use_sde", "sde_sample_freq"}
 SCHEDULE = re.compile(r"lin_(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """A value that falls linearly from this one to 0 at the end of the training."""
@@ -88,8 +97,11 @@ def arguments(config: Config) -> dict[str, Any]:
     start, squashed = config.training.start, name in SQUASHED
     if start is not None and squashed and max(map(abs, start)) > NEARLY_ALL:
         raise InputError(f"training.start = {list(start)}; {name} takes from {-NEARLY_ALL} to {NEARLY_ALL}.")
-    if config.training.critic and (name, config.policy, config.frame_stack) != ("ppo", "MlpPolicy", 1):
-        raise InputError("training.critic is for the MlpPolicy of ppo, without frame_stack.")
+    if config.training.critic and (name, config.policy, config.frame_stack) not in TWO_VIEWS:
+        raise InputError(
+            "training.critic is for the MlpPolicy of ppo and the MlpLstmPolicy of recurrent_ppo, without frame_stack."
+        )
+    _check_stage(config.training)
     _check(name, config.arguments, allowed(algorithm), OURS)
     _check_ranges(name, config.arguments)
     given = config.arguments.get("policy_kwargs", {})
@@ -103,6 +115,22 @@ def arguments(config: Config) -> dict[str, Any]:
     return made
 
 
+def _check_stage(training: Training) -> None:
+    """Refuse what does not go together: a teacher, networks to begin with, and rewards."""
+    name, imitates = training.algorithm, training.algorithm == "dagger"
+    if imitates and training.imitation is None:
+        raise InputError("dagger needs a teacher: give training.imitation, for example {teacher: ../teacher_{seed}}.")
+    if not imitates and training.imitation is not None:
+        raise InputError(f"training.imitation is for the algorithm dagger, not for {name}.")
+    unused = [key for key in REWARDED if imitates and getattr(training, key)]
+    if unused:
+        raise InputError(f"training.{unused[0]} does nothing with dagger, which learns from no reward.")
+    if training.start is not None and training.initial is not None:
+        raise InputError("training.start and training.initial both say where learning begins; give one of them.")
+    if training.held and (training.initial is None or name in SQUASHED):
+        raise InputError("training.held holds the networks of training.initial while a critic of PPO learns.")
+
+
 def policies(name: str) -> list[str]:
     """Policies for observations that are vectors."""
     return [p for p in find(name).policy_aliases if p.startswith("Mlp")]
@@ -110,7 +138,7 @@ def policies(name: str) -> list[str]:
 
 def allowed(taker: Callable[..., Any]) -> dict[str, Any]:
     """Keys that may be given, with their types."""
-    taken = inspect.signature(taker).parameters.values()
+    taken = inspect.signature(taker, eval_str=True).parameters.values()
     refused = {*NOT_GIVEN, *(STATE_DEPENDENT if any(taker is find(n) for n in SQUASHED) else ())}
     return {p.name: p.annotation for p in taken if p.name not in refused and not p.name.endswith("_class")}
 
@@ -137,7 +165,11 @@ def build(config: Config, worlds: VecEnv, seed: int) -> BaseAlgorithm:
     policy: Any = config.policy
     if critic:
         seen = seen_places(worlds, critic, len(config.training.traces))
-        policy, given["policy_kwargs"] = TwoViewPolicy, given.get("policy_kwargs", {}) | {"seen": seen}
+        policy = TWO_VIEWS[config.training.algorithm, config.policy, config.frame_stack]
+        given["policy_kwargs"] = given.get("policy_kwargs", {}) | {"seen": seen}
+    if config.training.imitation is not None:
+        decisions = -(-worlds.get_attr("steps", 0)[0] // config.training.hold)
+        given |= {"imitation": config.training.imitation, "decisions": decisions}
     try:
         made = find(config.training.algorithm)(
             policy=policy, env=worlds, seed=seed, device=config.training.device, verbose=0, **given

@@ -14,8 +14,9 @@ it is to read therefore has them once more, as arguments of the wrapper SAME_SET
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -27,6 +28,7 @@ from dms_core.validation import cut, shown
 from exo_env.settings import Settings
 
 from .config_file import SAME_SETTINGS, TRAINING, check_wrapper, chosen, override_values, sections
+from .imitation import Imitation
 from .rl_zoo_text import plain, write_call
 
 ALIASES = {"ppo_lstm": "recurrent_ppo"}
@@ -68,6 +70,12 @@ class Training(Settings):
         description="action whose reward on the same patient is taken off that of training; None: none",
     )
     critic: tuple[str, ...] = Field(default=(), description="groups or channels that only PPO's critic sees")
+    imitation: Imitation | None = Field(default=None, description="of a teacher, by the algorithm dagger")
+    initial: str | None = Field(
+        default=None, min_length=1, max_length=4096,
+        description="trained policy whose networks learning begins with; named like a teacher",
+    )  # fmt: skip
+    held: int = Field(default=0, ge=0, le=MOST_STEPS, description="steps at the start in which only the critic learns")
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?|mps|auto)$", description="of PyTorch")
 
 
@@ -140,6 +148,26 @@ class Config:
             arguments=rest,
             section=section,
         )
+
+    def placed(self, folder: Path, seed: int) -> Self:
+        """The configuration in its training's folder: names of other trainings are paths.
+
+        Args:
+            folder: of the training, beside which a policy lies whose name begins with ../.
+            seed: of the training, in place of {seed}.
+        """
+
+        def path(name: str) -> str:
+            named = name.replace("{seed}", str(seed))
+            return os.path.normpath(folder / named) if named.startswith("../") else named
+
+        training, imitation = self.training, self.training.imitation
+        changes: dict[str, Any] = {}
+        if training.initial is not None:
+            changes["initial"] = path(training.initial)
+        if imitation is not None:
+            changes["imitation"] = imitation.model_copy(update={"teacher": path(imitation.teacher)})
+        return replace(self, training=training.model_copy(update=changes))
 
     def content(self) -> dict[str, Any]:
         """What a file of this configuration holds; rl_zoo3 reads it too."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import torch
+from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 from stable_baselines3.common.vec_env import VecEnv
@@ -67,6 +68,44 @@ class TwoViewPolicy(ActorCriticPolicy):
     def _build_mlp_extractor(self) -> None:
         layers: Any = TwoViews(self.features_dim, self.seen, self.net_arch, self.activation_fn, self.device)
         self.mlp_extractor = layers
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return super()._get_constructor_parameters() | {"seen": self.seen}
+
+
+class TwoViewLstmPolicy(RecurrentActorCriticPolicy):
+    """MlpLstmPolicy of recurrent PPO with an actor that sees a part of what the critic sees.
+
+    Args:
+        seen: places of the observation's components that the actor sees.
+        given: as for MlpLstmPolicy.
+    """
+
+    def __init__(self, *given: Any, seen: Sequence[int], **more: Any) -> None:
+        super().__init__(*given, **more)
+        self.seen = list(seen)
+        wide, schedule = self.lstm_actor, given[2] if len(given) > 2 else more["lr_schedule"]
+        self.lstm_actor = nn.LSTM(len(self.seen), wide.hidden_size, num_layers=wide.num_layers)
+        made: Any = self.optimizer_class
+        self.optimizer = made(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
+
+    def _process_sequence(  # type: ignore[override]
+        self,
+        features: torch.Tensor,
+        lstm_states: tuple[torch.Tensor, torch.Tensor],
+        episode_starts: torch.Tensor,
+        lstm: nn.LSTM,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """As of sb3-contrib, from what the cells see; a sequence in which no episode begins is one call."""
+        # In training sequences are split where episodes begin, so that only their first state has to be forgotten.
+        if lstm is self.lstm_actor:
+            features = features[:, self.seen]
+        starts = episode_starts.reshape(lstm_states[0].shape[1], -1)
+        if starts[:, 1:].any():
+            return super()._process_sequence(features, lstm_states, episode_starts, lstm)
+        kept = (1.0 - starts[:, 0])[None, :, None]
+        states = (kept * lstm_states[0], kept * lstm_states[1])
+        return super()._process_sequence(features, states, torch.zeros_like(episode_starts), lstm)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return super()._get_constructor_parameters() | {"seen": self.seen}

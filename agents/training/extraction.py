@@ -7,6 +7,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
@@ -18,6 +19,9 @@ from ..policies.network import Architecture
 from ..provenance import package_version
 from .algorithms import ACTIVATIONS
 from .wrappers.low_pass import kept_shares
+
+CELL = {"input": "weight_ih", "state": "weight_hh", "input_bias": "bias_ih", "state_bias": "bias_hh"}
+"""Arrays of an LSTM cell by their names, and what PyTorch calls them."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +62,18 @@ def extract(
     Raises:
         InputError: the model's policy has parts that cannot be written down.
     """
-    layers, output = _layers(model)
     statistics: Any = normalisation or (model.get_vec_normalize_env() if model.get_env() is not None else None)
-    arrays = layers | _cells(model)
+    arrays = {name: one.detach().cpu().numpy().copy() for name, one in actor_parameters(model).items()}
     if statistics is not None and statistics.norm_obs:
         seen = getattr(model.policy, "seen", slice(None))
         arrays |= {"mean": statistics.obs_rms.mean[seen].copy(), "variance": statistics.obs_rms.var[seen].copy()}
+    output = "tanh" if _squashed(model) else "clip"
+    world: Any = env.unwrapped
+    told = {part.group for part in world.observation_structure} & set(world.task.revealing)
     description = Description(
         title=origin.title, algorithm=origin.algorithm, environment=origin.environment, exo_env=package_version(),
         env_kwargs=origin.env_kwargs, architecture=_architecture(model, arrays, output, env, statistics, origin),
-        steps=model.num_timesteps, seed=origin.seed, **world_facts(env),
+        steps=model.num_timesteps, seed=origin.seed, informed=bool(told), **world_facts(env),
     )  # fmt: skip
     return LearnedPolicy(description, arrays)
 
@@ -98,35 +104,37 @@ def _architecture(
     )  # fmt: skip
 
 
-def _layers(model: BaseAlgorithm) -> tuple[dict[str, np.ndarray], str]:
-    """Linear layers in order, and how their output becomes an action."""
+def actor_parameters(model: BaseAlgorithm) -> dict[str, torch.Tensor]:
+    """Parameters of the networks that act, by the names of the exported arrays: layers in order, then LSTM cells.
+
+    Raises:
+        InputError: the model's policy has parts that cannot be written down.
+    """
     policy: Any = model.policy
-    if hasattr(policy, "actor") and policy.actor is not None:
-        parts, output = [*policy.actor.latent_pi, policy.actor.mu], "tanh"
-    else:
-        parts, output = [*policy.mlp_extractor.policy_net, policy.action_net], "clip"
-    linear = [p for p in parts if isinstance(p, nn.Linear)]
+    squashed = _squashed(model)
+    parts = (
+        [*policy.actor.latent_pi, policy.actor.mu]
+        if squashed
+        else [*policy.mlp_extractor.policy_net, policy.action_net]
+    )
     known: Any = (nn.Linear, *ACTIVATIONS.values())
-    if not all(isinstance(p, known) for p in parts) or getattr(policy, "squash_output", False) != (output == "tanh"):
+    if not all(isinstance(p, known) for p in parts) or getattr(policy, "squash_output", False) != squashed:
         raise InputError(
             f"the {type(policy).__name__} of this model has parts that the exported form does not describe."
         )
-    arrays = {}
-    for k, layer in enumerate(linear):
-        arrays[f"layer.{k}.weight"], arrays[f"layer.{k}.bias"] = _array(layer.weight), _array(layer.bias)
-    return arrays, output
-
-
-def _cells(model: BaseAlgorithm) -> dict[str, np.ndarray]:
-    """LSTM cells of the actor."""
-    lstm = getattr(model.policy, "lstm_actor", None)
-    arrays: dict[str, np.ndarray] = {}
+    found: dict[str, torch.Tensor] = {}
+    for k, layer in enumerate(p for p in parts if isinstance(p, nn.Linear)):
+        found |= {f"layer.{k}.weight": layer.weight, f"layer.{k}.bias": layer.bias}
+    lstm = getattr(policy, "lstm_actor", None)
     for k in range(lstm.num_layers if lstm is not None else 0):
-        arrays[f"lstm.{k}.input"] = _array(getattr(lstm, f"weight_ih_l{k}"))
-        arrays[f"lstm.{k}.state"] = _array(getattr(lstm, f"weight_hh_l{k}"))
-        arrays[f"lstm.{k}.input_bias"] = _array(getattr(lstm, f"bias_ih_l{k}"))
-        arrays[f"lstm.{k}.state_bias"] = _array(getattr(lstm, f"bias_hh_l{k}"))
-    return arrays
+        for name, theirs in CELL.items():
+            found[f"lstm.{k}.{name}"] = getattr(lstm, f"{theirs}_l{k}")
+    return found
+
+
+def _squashed(model: BaseAlgorithm) -> bool:
+    """Whether actions are the tanh of what the last layer says."""
+    return getattr(model.policy, "actor", None) is not None
 
 
 def _activation(model: BaseAlgorithm) -> str:
@@ -136,7 +144,3 @@ def _activation(model: BaseAlgorithm) -> str:
         if policy.activation_fn is kind:
             return name
     raise InputError(f"activation {policy.activation_fn.__name__} is not one of {', '.join(ACTIVATIONS)}.")
-
-
-def _array(parameter: Any) -> np.ndarray:
-    return parameter.detach().cpu().numpy().copy()

@@ -17,6 +17,7 @@ from dms_core.files.json_text import finite
 from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import cut, shown
 
+from ..policies.learned import LearnedPolicy, find_policy
 from .config import Config, Training
 from .config_file import TRAINING
 
@@ -50,6 +51,8 @@ def fixed_values(config: Config) -> dict[str, Any]:
         "env_kwargs": config.env_kwargs, **config.arguments,
         TRAINING: {k: v for k, v in training.items() if f"{TRAINING}.{k}" not in MAY_CHANGE},
     }  # fmt: skip
+    if training["imitation"] is not None:
+        own["content of the teacher"] = _digest_of_policy(training["imitation"]["teacher"])
     files = {f"content of {key}": _digest(value) for key, value in _leaves(own) if _is_file(value)}
     return json.loads(json.dumps(finite(own | files)))
 
@@ -67,7 +70,10 @@ def check_fixed(before: Mapping[str, Any], config: Config, folder: Path) -> None
     """
     # A version that knows further keys of `training` finds their defaults, under which the training began.
     defaults = dict(_leaves({TRAINING: json.loads(Training(algorithm="").model_dump_json())}))
-    then, now = defaults | dict(_leaves(before)), dict(_leaves(fixed_values(config)))
+    began = dict(_leaves(before))
+    # A default that is no mapping stands in no file whose value is one.
+    defaults = {key: value for key, value in defaults.items() if not any(k.startswith(f"{key}.") for k in began)}
+    then, now = defaults | began, dict(_leaves(fixed_values(config)))
     changed = [key for key in (then | now) if then.get(key, ABSENT) != now.get(key, ABSENT) and key not in MAY_CHANGE]
     if not changed:
         return
@@ -95,6 +101,15 @@ def _said(values: Mapping[str, Any], key: str) -> str:
 def _is_file(value: Any) -> bool:
     """Whether a value names a population, a device or a model of the user's."""
     return isinstance(value, str) and value.endswith((".yaml", ".yml")) and Path(value).is_file()
+
+
+def _digest_of_policy(name: str) -> str | None:
+    """SHA-256 of a trained policy's weights; None of a policy that is code."""
+    policy = find_policy(name)
+    if not isinstance(policy, LearnedPolicy):
+        return None
+    content = {key: array.tolist() for key, array in policy.arrays.items()}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _digest(path: str) -> str:

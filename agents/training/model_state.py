@@ -25,7 +25,10 @@ from dms_core.files.input_file import opened
 from dms_core.files.json_text import brief
 from dms_core.files.output_file import write_bytes, write_file
 
+from .dagger import Dagger
+
 MODEL, STATISTICS, REPLAY, RANDOM = "model.zip", "statistics.npz", "replay.npz", "random.npz"
+DEMONSTRATIONS = "demonstrations.npz"
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 """Arrays of a replay buffer."""
 
@@ -35,6 +38,8 @@ def save_state(model: BaseAlgorithm, folder: Path) -> None:
     save_model(model, folder)
     if isinstance(model, OffPolicyAlgorithm):
         _save_replay(model, folder / REPLAY)
+    if isinstance(model, Dagger):
+        _write(folder / DEMONSTRATIONS, **model.demonstrations.columns)
     kind, keys, position, has_gauss, gauss = np.random.get_state()
     of_python = random.getstate()
     _write(
@@ -67,6 +72,8 @@ def load_state(model: BaseAlgorithm, folder: Path) -> None:
             _load_statistics(statistics, folder / STATISTICS)
         if isinstance(model, OffPolicyAlgorithm):
             _load_replay(model, folder / REPLAY)
+        if isinstance(model, Dagger):
+            _load_demonstrations(model, folder / DEMONSTRATIONS)
         _load_random(folder / RANDOM)
     except OSError as error:
         raise InputError(f"'{error.filename}' cannot be read: {error.strerror}.") from None
@@ -140,6 +147,16 @@ def _load_replay(model: OffPolicyAlgorithm, path: Path) -> None:
     if len(rows) > 1 or rows != {buffer.buffer_size if full else position} or not 0 <= position < buffer.buffer_size:
         raise InputError(f"'{path}' does not hold the replay buffer of this configuration: place does not fit.")
     buffer.pos, buffer.full = position, full
+
+
+def _load_demonstrations(model: Dagger, path: Path) -> None:
+    """What a teacher said in the last rounds."""
+    try:
+        model.demonstrations.restore(_read(path))
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"'{path}' does not hold the demonstrations of this configuration: {error}.") from None
 
 
 def _write(path: Path, **arrays: Any) -> None:

@@ -23,6 +23,7 @@ from ..policies.learned import LearnedPolicy
 from .algorithms import build
 from .config import Config
 from .extraction import Origin, extract
+from .initial import begin_with, hold_actor
 from .learning_curve import Judge, LearningCurve, checkpoint_name
 from .model_state import load_state, save_state
 from .records import STATE, read_state
@@ -68,6 +69,8 @@ class TrainingRun:
         if checkpoint is not None:
             load_state(self.model, checkpoint)
             self._restore(state)
+        elif config.training.initial is not None:
+            begin_with(self.model, config.training.initial, self.curve.env, self._origin())
         self.saved = state["steps"] if checkpoint is not None else -1
 
     @property
@@ -146,12 +149,15 @@ class TrainingRun:
 
     def policy(self) -> LearnedPolicy:
         """The policy of now."""
+        return extract(self.model, self.curve.env, self._origin())
+
+    def _origin(self) -> Origin:
+        """What the policy is trained with."""
         training = self.config.training
-        origin = Origin(
+        return Origin(
             self.config.environment, training.algorithm, self.seed, self.config.env_kwargs, training.traces,
             training.hold,
         )  # fmt: skip
-        return extract(self.model, self.curve.env, origin)
 
     def _restore(self, state: dict[str, Any]) -> None:
         """Counters of a checkpoint."""
@@ -182,6 +188,8 @@ class _Watch(BaseCallback):
     def _on_rollout_start(self) -> None:
         run, settings = self.run, self.run.config.training
         self.begun = run.steps
+        if settings.held:
+            hold_actor(run.model, run.steps < settings.held)
         last = run.evaluations[-1]["steps"] if run.evaluations else -settings.eval_every
         if run.steps - last >= settings.eval_every:
             run.evaluate()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from dms_core.errors import DmsError, InputError, extra
 
@@ -38,14 +36,13 @@ def checked_config(path: Path, changes: tuple[str, ...], environment: str | None
         InputError: names file, key and value.
     """
     from .algorithms import arguments
-    from .worlds import observed_settings
 
     config = Config.read(path, changes, environment)
     try:
         arguments(config)
         _check_device(config.training.device)
         check_settings(config.environment, config.env_kwargs)
-        _check_critic(config.environment, observed_settings(config))
+        _check_critic(config)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return config
@@ -62,9 +59,35 @@ def _check_device(device: str) -> None:
         raise InputError("training.device = 'mps': PyTorch sees no such device here; expected 'cpu' or 'auto'.")
 
 
-def _check_critic(environment: str, settings: Mapping[str, Any]) -> None:
+def check_other_policies(config: Config) -> None:
+    """Refuse a teacher or a policy to begin with that is not there or acts in another environment.
+
+    Args:
+        config: placed in its folder, see `Config.placed`.
+
+    Raises:
+        InputError: names the key and the policy.
+    """
+    from ..environment import make
+    from ..policies.learned import find_policy
+    from .worlds import teacher_of
+
+    if config.training.imitation is not None:
+        teacher_of(config)
+    if config.training.initial is not None:
+        try:
+            find_policy(config.training.initial).reset(make(config.environment, **config.env_kwargs))
+        except InputError as error:
+            raise InputError(f"training.initial: {error}") from None
+
+
+def _check_critic(config: Config) -> None:
     """Refuses settings of worlds whose observation, that of the critic included, is not possible."""
+    from .worlds import observed_settings
+
+    if not config.training.critic:
+        return
     try:
-        check_settings(environment, settings)
+        check_settings(config.environment, observed_settings(config))
     except InputError as error:
         raise InputError(f"training.critic: {error}") from None

@@ -13,9 +13,11 @@ from ..environment import ENVIRONMENT, make, make_sb3_worlds
 from .algorithms import arguments
 from .config import Config
 from .critic import actor_size
+from .teacher import Teacher
 from .wrappers.action_repeat import ActionRepeat
 from .wrappers.low_pass import LowPassObservations, kept_shares
 from .wrappers.paired_rewards import PairedRewards
+from .wrappers.taught import Taught
 
 
 def training_worlds(
@@ -47,13 +49,25 @@ def training_worlds(
 
 
 def observed_settings(config: Config) -> dict[str, Any]:
-    """Settings of the training worlds: what only the critic sees stands behind what the policy sees."""
+    """Settings of the training worlds: what only a critic or a teacher sees stands behind what the policy sees."""
+    if config.training.imitation is not None:
+        return config.env_kwargs | {"observation": teacher_of(config).observation}
     if not config.training.critic:
         return config.env_kwargs
     env: Any = make(config.environment, **config.env_kwargs)
     own = env.unwrapped.settings.observation
     env.close()
     return config.env_kwargs | {"observation": [*own, *config.training.critic]}
+
+
+def teacher_of(config: Config) -> Teacher:
+    """The teacher of an imitation.
+
+    Raises:
+        InputError: there is none of this name, or it acts in another environment.
+    """
+    assert config.training.imitation is not None
+    return Teacher(config.training.imitation.teacher, config.environment, config.env_kwargs)
 
 
 def wrapped(config: Config, seed: int) -> VecEnv:
@@ -68,6 +82,8 @@ def wrapped(config: Config, seed: int) -> VecEnv:
     for name, action in (("start", config.training.start), ("against", against)):
         if action is not None and len(action) != single.shape[0]:
             raise InputError(f"training.{name} = {list(action)}: expected {single.shape[0]} numbers, one an action.")
+    if config.training.imitation is not None:
+        worlds = Taught(worlds, teacher_of(config))
     period = config.training.hold * worlds.get_attr("period", 0)[0]
     if config.training.hold > 1:
         worlds = ActionRepeat(worlds, config.training.hold)

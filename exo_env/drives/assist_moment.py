@@ -97,6 +97,8 @@ class AssistMoment(CommandedTensions):
 
     kernel: ClassVar[Any] = moment_tensions
     rtol: ClassVar[float] = 0.01
+    """Over an episode of rough actions the elbow of 40 patients stayed within 0.3e-3 rad of the run at 1e-6 in half of
+    them, within 2.8e-3 in nine of ten, as with rope tensions (0.3e-3, 3.3e-3); twice that with 0.02."""
     max_moment: float = Field(
         default=15.0, gt=0.0, le=200.0,
         description="largest moment [Nm]; assumed: the default device's agonist gives it with 200 N from 68 deg of "

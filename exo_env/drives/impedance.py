@@ -10,13 +10,13 @@ law acts at all times within a control period; an action only changes its three 
 with a largest rate, so that nothing jumps.
 
 The spring has no angle to hold, for the device knows no reference. If its zero were set to the measured angle at each
-control time, as "reset about the measured angle" says to the letter, it would never be more than 0.02 s behind the
-arm: such a spring is a damper of 0.01 s times K whose moment jumps 50 times a second. Here the zero follows the
-angle with the time constant T_0 (`relaxation_time`), as in a spring and a damper in series (Maxwell). What is quicker
-than T_0 meets the spring: tremor of 4 Hz and more, a push, a load that drops. What is slower meets a damper of K T_0,
-and the patient moves where he likes. The default of 0.1 s, a corner at 1.6 Hz, lies between tremor and voluntary
-movement: 60 deg in 1.5 s meet 2 Nm at their quickest where K is half of the default's largest. T_0 of half a control
-period is the reset to the letter without its jumps, and T_0 of an hour a spring about the angle of the start.
+control time, every 0.02 s, it would hardly ever be apart from the arm: such a spring is a damper of 0.01 s times K
+whose moment jumps 50 times a second. Here the zero follows the angle with the time constant T_0 (`relaxation_time`), as
+in a spring and a damper in series (Maxwell). What is quicker than T_0 meets the spring: tremor of 4 Hz and more, a
+push, a load that drops. What is slower meets a damper of K T_0, and patients move where they like. The default of 0.1
+s, a corner at 1.6 Hz, lies between tremor and voluntary movement: 60 deg in 1.5 s meet 2 Nm at their quickest where K
+is half of the default's largest. T_0 of half a control period is that reset without its jumps, and T_0 of an hour a
+spring about the angle of the start.
 
 M_g is the moment that holds the arm of an average person (the default `Person`) and the lower link of the device, since
 the device does not know the patient. A share above 1 carries load too.
@@ -53,6 +53,9 @@ class Impedance(RopeMotors):
 
     kernel: ClassVar[Any] = affine
     rtol: ClassVar[float] = 0.01
+    """Over an episode of rough actions the elbow of 40 patients stayed within 0.3e-3 rad of the run at 1e-6 in half of
+    them, within 1.0e-3 in nine of ten; 0.02 gives 0.4e-3 and 1.0e-3, 0.7e-3 and 1.5e-3 on another population, and is
+    only a fifteenth faster."""
     max_stiffness: float = Field(
         default=30.0, gt=0.0, le=1000.0,
         description="largest K [Nm/rad]; assumed: 0.5 rad away it asks for all that the ropes can give, and times the "
@@ -62,7 +65,7 @@ class Impedance(RopeMotors):
         default=3.0, gt=0.0, le=100.0, description="largest D [N m s/rad]; assumed: three times the hinge's friction"
     )
     max_gravity_share: float = Field(
-        default=3.5, gt=0.0, le=100.0, description="largest s [-]; assumed: it holds 2 kg in a limp arm"
+        default=4.0, gt=0.0, le=100.0, description="largest s [-]; assumed: 3.7 hold 2 kg in a limp arm"
     )
     relaxation_time: float = Field(
         default=0.1, ge=0.001, le=1e4, description="T_0 with which the spring's zero follows the angle [s]; assumed"
@@ -72,7 +75,12 @@ class Impedance(RopeMotors):
     )
 
     def actions(self, device: Exoskeleton) -> tuple[str, ...]:
-        """Stiffness, damping and gravity share."""
+        """Stiffness, damping and gravity share.
+
+        Raises:
+            InputError: there are not as many largest tensions as the device has ropes.
+        """
+        self.largest(device)
         return "stiffness", "damping", "gravity share"
 
     def commands(self, device: Exoskeleton) -> tuple[Command, ...]:

@@ -56,7 +56,7 @@ from exo_env.tasks.channels import Parts, Slice
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.observer import Observer
 from exo_env.tasks.task import NOTHING, Task
-from exo_env.world.control_period import finish, run_period
+from exo_env.world.control_period import finish, move, next_stop, run_period
 from exo_env.world.episode import Episode
 from exo_env.world.held_episode import take_up
 from exo_env.world.readout import Readout
@@ -96,9 +96,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
         self.action_mode, self.drive = s.action_mode, self._made_drive(s)
         check_drive(self.drive, self.ecosystem.device)
         actions = self.drive.actions(self.ecosystem.device)
-        self.task = self.task_type(
-            Parts(self.ecosystem.arm().muscles, tuple(self.ecosystem.device.ropes), actions), s.reward_weights, s.limits
-        )
+        self.task = self.made_task(s, Parts(self.ecosystem.arm().muscles, tuple(self.ecosystem.device.ropes), actions))
         self.movement, self.population = self.made_movement(s.reference), population(s.patient)
         self.load = load_distribution(s.load)
         self.observer = Observer(s.observation, self.task.readings, self.task.groups, s.noise, self.period)
@@ -127,6 +125,10 @@ class AssistanceEnv(Copied, gymnasium.Env):
             device=worn_device(settings.exoskeleton), subject=read_subject(settings.subject),
             misalignment=worn_misalignment(settings.misalignment),
         )  # fmt: skip
+
+    def made_task(self, settings: EnvSettings, parts: Parts) -> Task:
+        """The task, with its weights and limits as the settings change them."""
+        return self.task_type(parts, settings.reward_weights, settings.limits)
 
     def made_movement(self, reference: Any) -> Movement:
         """The movement that patients intend.
@@ -331,13 +333,14 @@ class AssistanceEnv(Copied, gymnasium.Env):
         """Go on where compiled code gave up: a singular matrix may need another order of elimination."""
         dynamics, status = self.world.dynamics, self.world.tables.status
         dynamics.result = RESULT_OF[int(status[STATUS.code])]
-        if status[STATUS.code] == MATRIX_SINGULAR:
-            dynamics.advance(float(self.world.times[status[STATUS.step] + 1]))
-        if dynamics.result is Result.INTERRUPTED:
-            raise KeyboardInterrupt
-        if dynamics.result is Result.SUCCESS:
-            status[STATUS.code] = DONE
+        while status[STATUS.code] == MATRIX_SINGULAR:
+            dynamics.advance(next_stop(self.world.packed.table))
+            if dynamics.result is Result.INTERRUPTED:
+                raise KeyboardInterrupt
+            if dynamics.result is not Result.SUCCESS:
+                break
             self.world.follow_dynamics()
+            dynamics.result = RESULT_OF[move(self.world.packed.table)]
         finish(self.world.packed.table)
 
     def happened(self) -> str | None:

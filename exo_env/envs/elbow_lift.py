@@ -37,9 +37,10 @@ class ElbowLiftEnv(AssistanceEnv):
     possible, the device no more than is needed: effort is forgotten where the device leaves no error.
 
     ## Action Space
-    `Box(-1, 1, (2,), float32)`. Numbers beyond -1 to 1 are clipped; a number that is not finite, or another shape, is
-    an error. An action says what the commands are at the end of its control period. With `action_mode="rope_tension"`
-    (the default) these are tensions, which change by at most 2000 N/s and follow with a lag of 0.02 s:
+    `Box(-1, 1, (2,), float32)`, or three numbers for "impedance". Numbers beyond -1 to 1 are clipped; a number that is
+    not finite, or another shape, is an error. An action says what the commands are at the end of its control period.
+    With `action_mode="rope_tension"` (the default) these are tensions, which change by at most 2000 N/s and follow with
+    a lag of 0.02 s:
 
     | Num | Action             | Min | Max | Control Min | Control Max | Unit |
     |-----|--------------------|-----|-----|-------------|-------------|------|
@@ -53,6 +54,25 @@ class ElbowLiftEnv(AssistanceEnv):
     |-----|--------------------|-----|-----|-------------|-------------|------|
     | 0   | setpoint change    | -1  | 1   | -0.2        | 0.2         | rad  |
     | 1   | authority          | -1  | 1   | 0           | 1           | -    |
+
+    With `action_mode="assist_moment"` it is a moment about the device's hinge and a co-tension, the mean tension of
+    both ropes beside it. The device's moment arms at the measured angle make tensions of them, which stay within those
+    above and follow in the same way:
+
+    | Num | Action             | Min | Max | Control Min | Control Max | Unit |
+    |-----|--------------------|-----|-----|-------------|-------------|------|
+    | 0   | moment             | -1  | 1   | -15         | 15          | Nm   |
+    | 1   | co-tension         | -1  | 1   | 0           | 40          | N    |
+
+    With `action_mode="impedance"` the device is compliant: a spring, whose zero follows the hinge with a time constant
+    of 0.1 s, a damper, and a share of the moment that holds an average arm and the device's link; the motors follow
+    this law with a lag of 0.02 s. Each number changes by at most 10 times its largest value in a second:
+
+    | Num | Action             | Min | Max | Control Min | Control Max | Unit      |
+    |-----|--------------------|-----|-----|-------------|-------------|-----------|
+    | 0   | stiffness          | -1  | 1   | 0           | 30          | Nm/rad    |
+    | 1   | damping            | -1  | 1   | 0           | 3           | N m s/rad |
+    | 2   | gravity share      | -1  | 1   | 0           | 4           | -         |
 
     ## Observation Space
     `Box`, float32, of the groups in `observation`: "device" (the default) is what a worn exoskeleton can measure, "emg"
@@ -87,8 +107,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | unsafe     | -1 where an event ends the episode                       | 100    |
 
     ## Starting State
-    At rest on the reference, muscles as the patient's command wants them; with "rope_tension" the agonist holds what
-    they do not. Each field of the patient, the load (0.5 to 2 kg), each
+    At rest on the reference, muscles as the patient's command wants them; the agonist holds what they do not, but for
+    "pid_setpoint". Each field of the patient, the load (0.5 to 2 kg), each
     number of the repetition and the noise of each channel comes from a random stream of its own, of the one number that
     a reset takes from the environment's generator. `reset(options={...})` fixes any of `patient`, `load` [kg],
     `reference` (numbers of a repetition: `start_deg` from 20 to 100, with `amplitude_deg` up to 100 in all) and
@@ -115,8 +135,8 @@ class ElbowLiftEnv(AssistanceEnv):
     | `misalignment`     | `None`           | `shift` [x, y, z] m of the hinge, `tilt_deg` [about x, then y]           |
     | `subject`          | `"arm26"`        | anatomy by name or YAML file                                             |
     | `reference`        | `None`           | distributions of start_deg, amplitude_deg, rest, duration, pause         |
-    | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`                                                      |
-    | `drive_settings`   | `None`           | changes of the mode's motor or filter, see `exo_env/drives`              |
+    | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`, `"assist_moment"`, `"impedance"`                    |
+    | `drive_settings`   | `None`           | changes of the mode's settings, see `exo_env/drives`                     |
     | `observation`      | `["device"]`     | groups, or single channels as `"group.channel"`, in order                |
     | `noise`            | `True`           | `False`, or a channel's deviation, delay and quantum                     |
     | `reward_weights`   | `None`           | changes of the weights                                                   |

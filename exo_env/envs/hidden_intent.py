@@ -13,6 +13,7 @@ from exo_env.drives.modes import WITHOUT_REFERENCE
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.settings import EnvSettings, check_whole
 from exo_env.envs.vector_env import AssistanceVectorEnv
+from exo_env.tasks.channels import Parts
 from exo_env.tasks.hidden_intent import HiddenIntentTask, NewPatientTask
 from exo_env.tasks.intentions import Intentions
 from exo_env.tasks.movement import Movement
@@ -28,6 +29,7 @@ class HiddenIntentSettings(EnvSettings):
 
     action_mode: str = Field(default="assist_moment", description="drive, by name")
     repetitions: Any = Field(default=1, description="number of windows in an episode, each with a plan of its own")
+    electrodes: Any = Field(default=None, description="changes of what may be wrong with the electrodes")
 
 
 class NewPatientSettings(HiddenIntentSettings):
@@ -74,7 +76,8 @@ class HiddenIntentEnv(AssistanceEnv):
 
     "emg" has six envelopes with unknown gains, crosstalk, delay, noise, channels that drop out and electrodes that are
     put on anew (`exo_env/tasks/electrodes.py`); "imu" the forearm's rate and specific force; "privileged" the patient's
-    traits, true states and the plan. Groups and single channels ("emg.emg") are composed by name.
+    traits, true states and the plan; "clock" the time since the episode began, which no worn device knows and only an
+    ablation may see. Groups and single channels ("emg.emg") are composed by name.
 
     ## Rewards
     The sum of six terms times their weights (`exo_env/tasks/intent_rewards.py` gives reasons and sources).
@@ -99,9 +102,11 @@ class HiddenIntentEnv(AssistanceEnv):
     ## Arguments
     Those of `exo/ElbowLift`, with another default of `action_mode`; `reference` are the distributions of `Intentions`
     (`exo_env/tasks/intentions.py`): start_deg, rest, targets, amplitude_deg, duration, pause, picked_up, and the shares
-    changes_of_mind and load_changes. With `repetitions` the patient has a plan in each of several windows of
-    `episode_duration / repetitions`; `exo/NewPatient-v0` has 8 of them with one patient: fatigue goes on, the load
-    changes, and electrodes are put on anew midway.
+    changes_of_mind and load_changes. `electrodes` says how much may be wrong with the electrodes: gain_deviation (0.3),
+    crosstalk (at most 0.2) and dropping (0.2, the share of the episodes in which a channel drops out). With
+    `repetitions` the patient has a plan in each of several windows of `episode_duration / repetitions`;
+    `exo/NewPatient-v0` has 8 of them with one patient: fatigue goes on, the load changes, and electrodes are put on
+    anew midway.
 
     ## Version History
     * v0: first version
@@ -117,6 +122,11 @@ class HiddenIntentEnv(AssistanceEnv):
         assert isinstance(settings, HiddenIntentSettings)
         check_whole("repetitions", settings.repetitions, MOST_REPETITIONS)
         return TIME * settings.repetitions
+
+    def made_task(self, settings: EnvSettings, parts: Parts) -> Task:
+        """The task, with its weights, limits and electrodes as the settings change them."""
+        assert isinstance(settings, HiddenIntentSettings) and issubclass(self.task_type, HiddenIntentTask)
+        return self.task_type(parts, settings.reward_weights, settings.limits, settings.electrodes)
 
     def made_movement(self, reference: Any) -> Movement:
         """Plans in as many windows as the settings say."""

@@ -24,11 +24,9 @@ from dms_core.model.geometry.rotations import dot, vec
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.ecosystem.exoskeleton import link_moment
 from exo_env.patient.motor_command import InternalModel
-from exo_env.patient.patient import PATIENT, Patient
+from exo_env.patient.patient import MIDDLE, PATIENT, Patient
 from exo_env.patient.static_optimisation import muscle_moment, needed_moment, needed_moments, with_weight
 
-MIDDLE = math.radians(60.0)
-"""Angle of the ability [rad]."""
 ABLE = 0.2
 """Ability from which a patient can do something [-]."""
 SMALLEST_SCALE = 1.0

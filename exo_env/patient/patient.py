@@ -8,6 +8,7 @@ of what is accepted, not a distribution.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, Self
 
@@ -18,6 +19,8 @@ from exo_env.ecosystem.person import SEXES, Person
 from exo_env.places import places
 from exo_env.traits import row_of, trait, traits_of
 
+MIDDLE = math.radians(60.0)
+"""Elbow angle in the middle of the exercise [rad], for which some of a patient's numbers hold."""
 LONGEST_DELAY = 0.5
 """Longest delay of a patient [s]; the memory of a patient is as long."""
 
@@ -69,8 +72,14 @@ class Patient(Person):
     )  # fmt: skip
     stretch_threshold: float = trait(
         0.5, ge=0.0, le=10.0, unit="rad/s", acts="effort",
-        description="rate of stretch, as rate of the elbow, below which there is no reflex [rad/s]; assumed, within "
-        "the 0.26 to 2.6 rad/s at which the paretic elbow's reflex is tested [McPherson 2018]",
+        description="rate of stretch, as rate of the elbow, below which there is no reflex at 60 deg [rad/s]; assumed, "
+        "within the 0.26 to 2.6 rad/s at which the paretic elbow's reflex is tested [McPherson 2018]",
+    )  # fmt: skip
+    stretch_threshold_slope: float = trait(
+        0.0, ge=0.0, le=10.0, unit="1/s", acts="effort", neutral=True,
+        description="by which that threshold falls for each radian by which the elbow stretches the muscle beyond 60 "
+        "deg [1/s]; that it falls, and 1 / slope relates threshold angle to rate: [Powers 1989], [Calota 2008]; value "
+        "assumed",
     )  # fmt: skip
     stretch_delay: float = trait(
         0.03, ge=0.0, le=LONGEST_DELAY, unit="s", acts="effort",
@@ -122,11 +131,22 @@ class Patient(Person):
     feedback_gain: float = trait(
         0.0, ge=0.0, le=5.0, unit="1/rad", acts="effort",
         description="proprioceptive feedback: excitation of the flexors, before weakness, per tracking error [1/rad]; "
-        "extensors minus it; assumed",
+        "extensors minus it; healthy from the stiffness of elbows that hold [Gomi 1998] and move "
+        "[Bennett 1993], after stroke assumed",
     )  # fmt: skip
     feedback_delay: float = trait(
         0.06, ge=0.0, le=LONGEST_DELAY, unit="s", acts="effort",
         description="its latency [s]; 50 to 60 ms [Hammond 1955]",
+    )  # fmt: skip
+    feedback_lead: float = trait(
+        0.0, ge=0.0, le=0.5, unit="s", acts="effort", neutral=True,
+        description="rate feedback: the error's rate counts as much as the error, times this lead [s]; that muscle "
+        "spindles report rates as well as lengths: [Matthews 1981]; value assumed",
+    )  # fmt: skip
+    prediction: float = trait(
+        0.0, ge=0.0, le=1.0, acts="effort", neutral=True,
+        description="share of its own corrections, not felt yet, that a forward model of the limb takes into account "
+        "[-]; that there is such a model: [Miall 1993]; value assumed",
     )  # fmt: skip
     effort_at_start: float = trait(
         1.0, ge=0.0, le=2.0, acts="effort",

@@ -15,29 +15,41 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pydantic import Field
+
 from dms_core.compiled.jit import compiled
 from exo_env.patient.distributions import Distribution, distribution
 from exo_env.places import places
+from exo_env.settings import Settings
 
 FAULTS = places(("crosstalk", "dropped", "drop_begin", "drop_length", "renewed"))
 """Places of the first numbers: part of the others' signal; number of the channel that drops out, from 0 on; when, as a
 part of the episode, and how long; and when electrodes are put on anew, above 1 for never. Then come the gains."""
-DROPPING = 0.2
-"""Share of the episodes in which a channel drops out."""
 
 
-def electrode_draws(muscles: Sequence[str], renewed: object) -> dict[str, Distribution]:
+class Electrodes(Settings):
+    """How much may be wrong with the electrodes."""
+
+    gain_deviation: float = Field(default=0.3, gt=0.0, le=1.0, description="standard deviation of the gains [-]")
+    crosstalk: float = Field(default=0.2, ge=0.0, le=1.0, description="most of the others' signal in one [-]")
+    dropping: float = Field(default=0.2, gt=0.0, le=1.0, description="share of episodes in which a channel drops out")
+
+
+def electrode_draws(
+    muscles: Sequence[str], renewed: object, electrodes: Electrodes | None = None
+) -> dict[str, Distribution]:
     """Distributions of what is drawn for an episode.
 
     Args:
         muscles: names of the channels.
         renewed: distribution of the part of the episode after which electrodes are put on anew.
+        electrodes: how much may be wrong with them.
     """
-    n = len(muscles)
-    gain = {"normal": {"mean": 1.0, "deviation": 0.3, "low": 0.3, "high": 2.0}}
+    n, wrong = len(muscles), electrodes or Electrodes()
+    gain = {"normal": {"mean": 1.0, "deviation": wrong.gain_deviation, "low": 0.3, "high": 2.0}}
     spreads = {
-        "crosstalk": {"uniform": [0.0, 0.2]},
-        "dropped": {"uniform": [0.0, n / DROPPING]},
+        "crosstalk": {"uniform": [0.0, wrong.crosstalk]},
+        "dropped": {"uniform": [0.0, n / wrong.dropping]},
         "drop_begin": {"uniform": [0.0, 1.0]},
         "drop_length": {"uniform": [0.05, 0.3]},
         "renewed": renewed,

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from dms_core.compiled.jit import compiled
+from dms_core.errors import choices
 from dms_core.kernels import floats, inner, matrix
 from exo_env.ecosystem.sensors import FOREARM_IMU
 from exo_env.patient.distributions import Distribution
 from exo_env.places import places
-from exo_env.settings import Settings
+from exo_env.settings import Settings, given_mapping
 from exo_env.tables import DRAW, DRIVE, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading
 from exo_env.tasks.checked import begins
@@ -23,7 +24,7 @@ from exo_env.tasks.elbow import (
     privileged_channels,
     read_elbow,
 )
-from exo_env.tasks.electrodes import electrode_draws, put_envelopes
+from exo_env.tasks.electrodes import Electrodes, electrode_draws, put_envelopes
 from exo_env.tasks.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
 from exo_env.tasks.intentions import Intentions
 from exo_env.tasks.limits import EVENTS, Limits, exceeded, limit_sentence
@@ -62,6 +63,7 @@ def intent_readings(parts: Parts) -> list[Reading]:
         Reading("needed_moment", "Nm"),
         Reading("lacking_moment", "Nm"),
         Reading("opposing_power", "W"),
+        Reading("clock", "s"),
     ]
 
 
@@ -87,6 +89,7 @@ def read_intent(w):
     r[at[INTENT.intent_acceleration]], r[at[INTENT.needed_moment]] = course[k, 2], needed
     r[at[INTENT.lacking_moment]] = floats(plan, PLAN.lacking)[k]
     r[at[INTENT.opposing_power]] = opposing_power(r[at[ELBOW.exo_moment]], needed, course[k, 1])
+    r[at[INTENT.clock]] = k * floats(w, WORLD.period)[0]
 
 
 @compiled
@@ -105,7 +108,17 @@ def judge_intent(w):
 
 
 class HiddenIntentTask(Task):
-    """The task: help the patient to where the patient wants, as much as is needed, against nobody."""
+    """The task: help the patient to where the patient wants, as much as is needed, against nobody.
+
+    Args:
+        parts: names of what the ecosystem and the drive have.
+        weights: changes of the terms' weights.
+        limits: changes of the limits.
+        electrodes: changes of what may be wrong with the electrodes.
+
+    Raises:
+        InputError: one of these is not possible.
+    """
 
     weights_type: ClassVar[type[Settings]] = IntentWeights
     limits_type: ClassVar[type[Settings]] = Limits
@@ -113,7 +126,8 @@ class HiddenIntentTask(Task):
     limits: Limits
     events: ClassVar[tuple[str, ...]] = EVENTS
     preview: ClassVar[tuple[float, ...]] = PREVIEW
-    revealing: ClassVar[tuple[str, ...]] = ("privileged",)
+    # A worn device does not know when an episode began; the clock is there to measure what that would be worth.
+    revealing: ClassVar[tuple[str, ...]] = ("privileged", "clock")
     reported: ClassVar[tuple[Reported, ...]] = (
         Reported("tracking_error_deg", "error", 180.0 / math.pi),
         Reported("device_share", "device_share"),
@@ -123,12 +137,23 @@ class HiddenIntentTask(Task):
     )
     read, judge = read_intent, judge_intent
 
+    def __init__(
+        self,
+        parts: Parts,
+        weights: Mapping[str, float] | None = None,
+        limits: Mapping[str, float] | None = None,
+        electrodes: Mapping[str, float] | None = None,
+    ) -> None:
+        given = given_mapping("electrodes", electrodes, f"some of {choices(Electrodes.model_fields)}, or None")
+        self.electrodes = Electrodes(**given)
+        super().__init__(parts, weights, limits)
+
     def declared_readings(self, parts: Parts) -> list[Reading]:
         """The readings of `intent_readings`."""
         return intent_readings(parts)
 
     def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
-        """Four groups: what a device measures, without reference or clock; EMG; an inertial sensor; all that is known.
+        """What a device measures, without reference or clock; EMG; an inertial sensor; all that is known; a clock.
 
         Noise of the inertial sensor on the wrist is assumed: a consumer sensor behind a filter of 20 Hz.
         """
@@ -151,11 +176,12 @@ class HiddenIntentTask(Task):
                 Channel("specific_force", 10.0, -200.0, 200.0, Imperfection(deviation=0.2)),
             ],
             "privileged": [*privileged_channels(), *plan],
+            "clock": [Channel("clock", 10.0, 0.0, 200.0)],
         }
 
     def draws(self) -> Mapping[str, Distribution]:
         """What goes wrong with the electrodes in an episode."""
-        return electrode_draws(self.parts.muscles, self.renewed())
+        return electrode_draws(self.parts.muscles, self.renewed(), self.electrodes)
 
     def renewed(self) -> object:
         """Distribution of the part of the episode after which electrodes are put on anew; above 1 for never."""

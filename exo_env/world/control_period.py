@@ -1,10 +1,11 @@
 """One control period of one world, compiled: from an action to an observation, a reward and what ended the episode.
 
-    patient -> excitations     drive -> commands     DAE -> state     sensors -> readings -> observation, reward, events
+    drive -> commands     patient -> excitations     DAE -> state     sensors -> readings -> observation, reward, events
 
-Inputs go linearly from what they were to their new values, so that the drive's largest rates are true at all times and
-nothing jumps inside the solver. Drive and task are called by address; a batch steps worlds in parallel without the
-Python lock.
+The patient acts at ticks of its own clock, which may lie anywhere in the period; the equations are advanced from one
+event, tick or end of the period, to the next. Inputs go linearly from what they were to their new values, so that the
+drive's largest rates are true at all times and nothing jumps inside the solver. Drive and task are called by address; a
+batch steps worlds in parallel without the Python lock.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from dms_core.kernels import (
     matrix,
     read_sensors,
 )
-from exo_env.patient.effort import EffortState, step_effort
+from exo_env.patient.effort import TICK, EffortState, step_effort
 from exo_env.tables import (
     DRIVE,
     DYNAMICS,
@@ -41,6 +42,9 @@ from exo_env.tasks.noise import imperfect
 from exo_env.tasks.task import SOLVER
 from exo_env.world.load_step import put_load
 
+SAME_TIME = 1e-6
+"""Time by which two events may lie apart and still be one [s]: too short for a step of the solver."""
+
 
 @compiled
 def effort_of(w):
@@ -49,6 +53,8 @@ def effort_of(w):
     return EffortState(
         floats(e, EFFORT.sign), floats(e, EFFORT.present), floats(e, EFFORT.active), floats(e, EFFORT.fatigued),
         matrix(e, EFFORT.command), matrix(e, EFFORT.drive), matrix(e, EFFORT.reflex), matrix(e, EFFORT.error),
+        floats(e, EFFORT.limb), floats(e, EFFORT.levers), matrix(e, EFFORT.copy), matrix(e, EFFORT.expected),
+        matrix(e, EFFORT.intents),
     )  # fmt: skip
 
 
@@ -81,18 +87,19 @@ def set_commands(w):
 
 @compiled
 def set_excitations(w):
-    """Set the excitations of the coming period, from what the patient wants and feels."""
-    patient, plan = inner(w, WORLD.patient), inner(w, WORLD.plan)
-    state, period = inner(inner(w, WORLD.dynamics), DYNAMICS.state), floats(w, WORLD.period)[0]
-    felt, k = floats(patient, PATIENT_TABLES.felt), ints(w, WORLD.status)[STATUS.step]
+    """Let the patient act: set the excitations until the next tick, from what the patient wants and feels."""
+    patient, state = inner(w, WORLD.patient), inner(inner(w, WORLD.dynamics), DYNAMICS.state)
+    felt, ticks = floats(patient, PATIENT_TABLES.felt), ints(patient, PATIENT_TABLES.ticks)
     excitations, rows = floats(patient, PATIENT_TABLES.excitations), ints(patient, PATIENT_TABLES.rows)
-    error = felt[FELT.angle] - matrix(plan, PLAN.course)[k, 0]
+    course, k = matrix(patient, PATIENT_TABLES.course), ticks[0]
+    angle, rate, tremor = felt[FELT.angle], felt[FELT.rate], floats(inner(w, WORLD.observer), OBSERVER.tremor)
     step_effort(
-        floats(patient, PATIENT_TABLES.traits), effort_of(w), period, matrix(patient, PATIENT_TABLES.wanted)[k + 1],
-        -error, felt[FELT.rate], floats(inner(w, WORLD.observer), OBSERVER.tremor)[k + 1], excitations,
+        floats(patient, PATIENT_TABLES.traits), effort_of(w), TICK, matrix(patient, PATIENT_TABLES.wanted)[k + 1],
+        course[k, 0] - angle, course[k, 1] - rate, angle, rate, tremor[k + 1], excitations,
     )  # fmt: skip
     for i in range(rows.shape[0]):
-        ramp(state, rows[i], excitations[i], period)
+        ramp(state, rows[i], excitations[i], TICK)
+    ticks[0] += 1
 
 
 @compiled
@@ -103,21 +110,45 @@ def options_of(w):
 
 
 @compiled
+def next_stop(w):
+    """Time of the next event behind the present [s]: the patient's next tick, or the end of the period under way."""
+    end = (ints(w, WORLD.status)[STATUS.step] + 1) * floats(w, WORLD.period)[0]
+    tick = ints(inner(w, WORLD.patient), PATIENT_TABLES.ticks)[0] * TICK
+    return tick if tick < end - SAME_TIME else end
+
+
+@compiled
 def move(w):
-    """Advance the equations to the end of the period under way; gives the solver's code."""
+    """Advance the equations to the end of the period under way; gives the solver's code.
+
+    Where the solver gave up and was helped to `next_stop`, this goes on from there.
+    """
     dynamics, status = inner(w, WORLD.dynamics), ints(w, WORLD.status)
-    end = (status[STATUS.step] + 1) * floats(w, WORLD.period)[0]
-    nothing = matrix(inner(w, WORLD.plan), PLAN.course)[:0]
+    period, ticks = floats(w, WORLD.period)[0], ints(inner(w, WORLD.patient), PATIENT_TABLES.ticks)
+    start, end, nothing = status[STATUS.step] * period, (status[STATUS.step] + 1) * period, no_record(w)
     model, state = inner(dynamics, DYNAMICS.model), inner(dynamics, DYNAMICS.state)
-    code, _ = advance(model, state, options_of(w), end, nothing, 0)
+    clock, code = floats(state, STATE.clock), DONE
+    while code == DONE and clock[T] < end:
+        if ticks[0] * TICK <= clock[T] + SAME_TIME:
+            # At its beginning `read` has felt already.
+            if clock[T] > start:
+                sense(w)
+            set_excitations(w)
+        code, _ = advance(model, state, options_of(w), next_stop(w), nothing, 0)
     status[STATUS.code] = code
     return code
 
 
 @compiled
-def read(w):
-    """Read the sensors, what the patient feels and the readings of the task, at the control time `status.step`."""
-    dynamics, task, patient = inner(w, WORLD.dynamics), inner(w, WORLD.task), inner(w, WORLD.patient)
+def no_record(w):
+    """A table without rows, for steps that are not recorded."""
+    return matrix(inner(w, WORLD.plan), PLAN.course)[:0]
+
+
+@compiled
+def sense(w):
+    """Read the sensors, and what the patient feels."""
+    dynamics, patient = inner(w, WORLD.dynamics), inner(w, WORLD.patient)
     s, y = inner(dynamics, DYNAMICS.state), floats(dynamics, DYNAMICS.y)
     read_sensors(
         inner(dynamics, DYNAMICS.sensing), inner(s, STATE.signals), floats(s, STATE.clock)[T], floats(s, STATE.q),
@@ -126,6 +157,13 @@ def read(w):
     felt, senses = floats(patient, PATIENT_TABLES.felt), ints(patient, PATIENT_TABLES.senses)
     for i in range(senses.shape[0]):
         felt[i] = y[senses[i]]
+
+
+@compiled
+def read(w):
+    """Read the sensors, what the patient feels and the readings of the task, at the control time `status.step`."""
+    sense(w)
+    task, y = inner(w, WORLD.task), floats(inner(w, WORLD.dynamics), DYNAMICS.y)
     r, source, target = floats(task, TASK.readings), ints(task, TASK.source), ints(task, TASK.target)
     for i in range(source.shape[0]):
         r[target[i]] = y[source[i]]
@@ -177,7 +215,6 @@ def run_period(w, action):
         now[i] = action[i]
     put_load(w)
     set_commands(w)
-    set_excitations(w)
     code = move(w)
     if code == DONE:
         finish(w)

@@ -34,7 +34,8 @@ from exo_env.drives.drive import start_apart
 from exo_env.ecosystem.exoskeleton import link_moment, rope_lever
 from exo_env.ecosystem.gym_machine import clearances
 from exo_env.patient.ability import put_lacking
-from exo_env.patient.effort import reset_effort, start_excitation
+from exo_env.patient.effort import TICK, largest_activation, reset_effort, start_excitation
+from exo_env.patient.forward_model import put_limb
 from exo_env.patient.motor_command import RELAXATION_APART, SETTLED, SWEEPS
 from exo_env.patient.patient import PATIENT
 from exo_env.patient.static_optimisation import (
@@ -158,7 +159,7 @@ def put_course(w):
 
 @compiled
 def put_command(w, arm, load, expected):
-    """Fill the motor command at each control time; gives the estimated error in an activation.
+    """Fill the motor command and psi at each tick of the patient; gives the estimated error in an activation.
 
     A long rest is planned once.
 
@@ -188,9 +189,32 @@ def put_command(w, arm, load, expected):
     moment, activations = np.empty(count), np.empty((count, arm.sign.shape[0]))
     needed_moments(arm, load, weights[:count], course[:count], moment)
     _, left = planned(arm, times[1], course[:count], moment, SWEEPS, RELAXATION_APART, SETTLED, activations)
-    wanted = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted)
-    interpolated(activations, row, times[1], floats(w, WORLD.period)[0], wanted)
+    put_ticks(w, activations, row, times[1])
     return left
+
+
+@compiled
+def put_ticks(w, activations, row, interval):
+    """Fill what the patient wants at each tick, from a table of activations at an interval [s], and psi there."""
+    patient, plan = inner(w, WORLD.patient), inner(w, WORLD.plan)
+    wanted, course = matrix(patient, PATIENT_TABLES.wanted), matrix(patient, PATIENT_TABLES.course)
+    interpolated(activations, row, interval, TICK, wanted)
+    times = np.empty(course.shape[0])
+    for k in range(times.shape[0]):
+        times[k] = k * TICK
+    course_of(floats(plan, PLAN.starts), matrix(plan, PLAN.coefficients), times, course)
+
+
+@compiled
+def mean_command(w, traits):
+    """Mean activation of each muscle that a patient can give to the command [-], shape (m,)."""
+    wanted, sign = matrix(inner(w, WORLD.patient), PATIENT_TABLES.wanted), floats(inner(w, WORLD.subject), SUBJECT.sign)
+    mean = np.zeros(sign.shape[0])
+    for i in range(sign.shape[0]):
+        most = largest_activation(traits, sign[i])
+        for k in range(wanted.shape[0]):
+            mean[i] += min(wanted[k, i], most) / wanted.shape[0]
+    return mean
 
 
 @compiled
@@ -211,7 +235,10 @@ def put_patient(w, arm, load, activations):
     )  # fmt: skip
     floats(w, WORLD.outcome)[OUTCOME.ability], floats(plan, PLAN.scale)[0] = ability, scale
     effort, wanted = effort_of(w), matrix(patient, PATIENT_TABLES.wanted)[0]
-    reset_effort(traits, effort, floats(w, WORLD.period)[0], wanted, floats(draw, DRAW.given)[GIVEN.phase])
+    given, constants = floats(draw, DRAW.given), floats(inner(w, WORLD.scaling), SCALING.constants)
+    expected = load_of(w, traits[PATIENT.expected_load] * given[GIVEN.load])
+    put_limb(traits, arm, expected, constants, mean_command(w, traits), effort.limb, effort.levers)
+    reset_effort(traits, effort, TICK, wanted, given[GIVEN.start], given[GIVEN.phase])
     for k in range(activations.shape[0]):
         activations[k] = start_excitation(effort, k)
 

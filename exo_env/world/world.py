@@ -24,7 +24,7 @@ from exo_env.ecosystem.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
 from exo_env.ecosystem.person import SEXES
 from exo_env.ecosystem.worn_exoskeleton import HINGE, LOWER, PID
 from exo_env.patient.ability import Need
-from exo_env.patient.effort import new_effort
+from exo_env.patient.effort import TICK, new_effort
 from exo_env.patient.motor_command import arm_table, load_table, unsettled
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.streams import stream
@@ -103,6 +103,8 @@ class PatientWorld:
         self.period, self.duration = period, duration
         self.times = np.arange(steps + 1) * period
         """Control times [s], shape (k,)."""
+        # The patient's last tick may be the end's, and it looks a tick ahead.
+        self._ticks = math.ceil(steps * period / TICK) + 2
         self._arm, self._worn = ecosystem.arm(), ecosystem.worn()
         self._scaling = scaling_of(ecosystem, drive)
         held = drive.start(ecosystem.device, 0.0)
@@ -164,8 +166,9 @@ class PatientWorld:
         muscles = self._arm.muscles
         senses = [self.names[f"elbow_angle.{name}"] for name in FELT._fields]
         return PatientTables(
-            traits=np.zeros(len(FIELDS)), effort=new_effort(self._arm.signs, self.period),
-            wanted=np.zeros((len(self.times), len(muscles))), excitations=np.zeros(len(muscles)),
+            traits=np.zeros(len(FIELDS)), effort=new_effort(self._arm.signs), ticks=np.zeros(1, np.int64),
+            wanted=np.zeros((self._ticks, len(muscles))), course=np.zeros((self._ticks, 3)),
+            excitations=np.zeros(len(muscles)),
             felt=np.zeros(len(FELT)), senses=np.array(senses, np.int64),
             rows=np.array([self._row(excitation_name(m)) for m in muscles], np.int64),
         )  # fmt: skip
@@ -198,7 +201,7 @@ class PatientWorld:
         o, k = self.observer, len(self.times)
         return ObserverTables(
             columns=o.columns, imperfections=o.imperfections,
-            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(k),
+            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(self._ticks),
             noise=np.zeros((k, o.size)), memory=o.memory(), observation=np.zeros(o.size),
         )  # fmt: skip
 

@@ -21,13 +21,19 @@ SECTIONS = {
     "tqc": {**OFF_POLICY, "policy_kwargs": "dict(net_arch=[16], n_critics=1)"},
     "recurrent_ppo": {**ON_POLICY, "normalize": True, "policy": "MlpLstmPolicy",
                       "policy_kwargs": "dict(net_arch=dict(pi=[8], vf=[8]), lstm_hidden_size=6, n_lstm_layers=2)"},
+    "dagger": {"n_envs": 2, "n_timesteps": 120, "batch_size": 20, "n_epochs": 2, "normalize": True,
+               "policy": "MlpLstmPolicy",
+               "policy_kwargs": "dict(net_arch=dict(pi=[8], vf=[8]), lstm_hidden_size=6, n_lstm_layers=2)"},
 }  # fmt: skip
+OF_ALGORITHM = {"dagger": {"imitation": {"teacher": "none", "driven": 80, "kept": 2, "segment": 8}}}
+"""What the section `training` has of an algorithm alone; a round has 2 times 20 steps."""
 
 
 def content(algorithm="ppo", training=None, **changes):
     """Content of a configuration file."""
     section = {**SECTIONS[algorithm], "env_kwargs": dict(ENV_KWARGS), **changes}
-    return {ENVIRONMENT: section, "training": {"algorithm": algorithm, **TRAINING, **(training or {})}}
+    own = {"algorithm": algorithm, **TRAINING, **OF_ALGORITHM.get(algorithm, {}), **(training or {})}
+    return {ENVIRONMENT: section, "training": own}
 
 
 def config_file(folder: Path, algorithm="ppo", training=None, **changes) -> Path:

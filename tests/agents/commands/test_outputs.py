@@ -7,9 +7,9 @@ from itertools import islice
 import pytest
 
 from agents.__main__ import main
-from agents.commands.tune_baselines import _table, _yaml
+from agents.commands.tune_baselines import _yaml
 from agents.evaluation.tables import whole_table
-from agents.evaluation.tuning import Try
+from agents.evaluation.tries import Try, table
 from dms_core.files.outputs import MANIFEST
 
 EVALUATE = ["evaluate", "--policy", "none", "--population", "stroke_mild", "--patients", "1"]
@@ -65,8 +65,8 @@ def test_numbers_of_the_baselines_are_replaced_with_the_flag(tmp_path, monkeypat
 
 def test_a_line_break_in_a_name_stays_in_its_comment():
     tries = {"pid": [Try("pid", {"x": 1.0}, {"return": 2.0})]}
-    assert _yaml(tries, "my\npatients: 1", "command\nwith: break").count("\n") == 5
-    assert _table(tries, "command\nwith: break").count("\n") == 3
+    assert _yaml(tries, {}, "my\npatients: 1", "command\nwith: break", "tries.csv").count("\n") == 5
+    assert table(tries, "command\nwith: break").count("\n") == 3
 
 
 def test_names_with_bars_and_breaks_leave_a_table_whole(tmp_path):

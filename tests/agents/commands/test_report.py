@@ -11,7 +11,8 @@ pytest.importorskip("matplotlib")
 from agents.__main__ import main
 from agents.commands.report import _again
 from agents.commands.report_input import collected, grouped
-from agents.evaluation.evaluate import by_patient, evaluate
+from agents.evaluation.by_patient import by_patient
+from agents.evaluation.evaluate import evaluate
 from agents.evaluation.pooling import pooled
 from agents.evaluation.report_figures import on_common_steps
 from agents.evaluation.statistics import interquartile_mean

@@ -14,7 +14,8 @@ import pytest
 
 from agents.__main__ import main
 from agents.commands.report_input import collected
-from agents.evaluation.tuning import Try, _pool
+from agents.evaluation.shares import processes
+from agents.evaluation.tries import Try
 from dms_core.files import output_place
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -131,8 +132,8 @@ def test_a_film_is_whole_or_not_there(stopped_at, tmp_path, capsys):
 @pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 def test_processes_of_a_pool_end_without_a_word(capfd):
     begin = time.perf_counter()
-    with pytest.raises(KeyboardInterrupt), _pool(2) as pool:
-        tried = pool.map(time.sleep, [60.0] * 20)
+    with pytest.raises(KeyboardInterrupt), processes(2) as share_out:
+        tried = share_out(time.sleep, [(60.0,)] * 20)
         threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
         next(tried)
     assert capfd.readouterr().err == ""

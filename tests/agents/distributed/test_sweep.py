@@ -14,9 +14,11 @@ import pytest
 pytest.importorskip("ray")
 
 from agents.__main__ import main
+from agents.commands.options import sharing_out
 from agents.distributed.cluster import share_out
 from agents.distributed.shared_evaluation import shared_out
 from agents.evaluation.evaluate import Plan, evaluate
+from agents.evaluation.tuning import tune
 from agents.policies.baselines import policy
 from dms_core.errors import DmsError, InputError
 from tests.agents.tiny import config_file
@@ -53,6 +55,14 @@ def test_a_cluster_that_is_not_there_is_named(monkeypatch):
     monkeypatch.delenv("RAY_AUTH_TOKEN", raising=False)
     with pytest.raises(DmsError, match="Ray at '127.0.0.1:1' cannot be reached.*RAY_AUTH_TOKEN"):
         share_out(complain, [(1,)], address="127.0.0.1:1")
+
+
+@pytest.mark.slow
+def test_a_search_is_that_of_one_process():
+    short = {"environment": "exo/HiddenIntent-v0", **SHORT}
+    with sharing_out(2, "local") as share_out:
+        found = tune("gravity", 6, 2, 0, share_out=share_out, **short)
+    assert found == tune("gravity", 6, 2, 0, **short)
 
 
 @pytest.mark.slow

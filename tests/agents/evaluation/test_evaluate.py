@@ -9,15 +9,17 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import patient_seeds
-from agents.evaluation.evaluate import by_patient, evaluate
+from agents.evaluation.by_patient import by_patient
+from agents.evaluation.evaluate import evaluate
 from agents.evaluation.measures import MEASURES
 from agents.evaluation.statistics import interquartile_mean
 from agents.evaluation.tables import short_table, whole_table
-from agents.policies.baselines import POLICIES, policy
+from agents.policies.baselines import FOLLOWING, POLICIES, policy
 from agents.policies.learned import LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from dms_core.errors import InputError
 from dms_core.files.outputs import MANIFEST
 
+USUAL = [m.name for m in MEASURES if not m.special]
 SHORT = {"episode_duration": 0.6}
 """Until the lift has begun; a whole episode tells no more and takes ten times as long."""
 
@@ -33,7 +35,7 @@ def test_seed_decides_all():
 
 
 def test_every_policy_meets_the_same_patients():
-    found = run(list(POLICIES))["policies"]
+    found = run(list(FOLLOWING))["policies"]
     met = [[(e["seed"], e["load"], e["patient"], e["reference"]) for e in p["episodes"]] for p in found.values()]
     assert all(m == met[0] for m in met)
     assert met[0][0] != met[0][1]
@@ -71,15 +73,15 @@ def test_round_off_is_printed_as_zero():
 
 
 def test_what_is_printed_fits_a_terminal():
-    found = run(list(POLICIES))
+    found = run(list(FOLLOWING))
     head, *rows = short_table(found).splitlines()
-    assert [row.split()[0] for row in rows] == list(POLICIES) and "difference to" in head
+    assert [row.split()[0] for row in rows] == list(FOLLOWING) and "difference to" in head
     assert max(map(len, [head, *rows])) <= 120
     # Longer names than those of baselines: the last part of a folder, where these differ.
     found["policies"] = {f"out/some/long/folder/{name}": p for name, p in found["policies"].items()}
     assert short_table(found) == "\n".join([head, *rows])
     found["policies"] = {name.rpartition("/")[2]: p for name, p in found["policies"].items()}
-    first, other = (found["policies"][name] for name in list(POLICIES)[:2])
+    first, other = (found["policies"][name] for name in list(FOLLOWING)[:2])
     expected = np.mean(by_patient(other["episodes"], "return") - by_patient(first["episodes"], "return"))
     assert f"{expected:.3g} [" in rows[1] and "difference" not in short_table(run(["pid"]))
 
@@ -117,8 +119,8 @@ def test_more_patients_keep_the_first():
 
 
 def test_shares_of_work_sum_to_one_and_measures_are_complete():
-    for p in run(list(POLICIES))["policies"].values():
-        assert [n for n in p["summary"] if not n.startswith("reward.")] == [m.name for m in MEASURES]
+    for p in run(list(FOLLOWING))["policies"].values():
+        assert [n for n in p["summary"] if not n.startswith("reward.")] == USUAL
         for e in p["episodes"]:
             m = e["measures"]
             shares = m["device_work_share"], m["patient_work_share"]
@@ -130,7 +132,7 @@ def test_shares_of_work_sum_to_one_and_measures_are_complete():
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (["--policy", "nobody"], "unknown policy 'nobody'. There are: assist_as_needed, learned, none, pid"),
+        (["--policy", "nobody"], "unknown policy 'nobody'. There are: adaptive_gravity, admittance, assist_as_needed"),
         (["--policy", "none", "none"], "different"),
         (["--policy", "none", "--population", "martians"], "unknown population 'martians'"),
         (["--policy", "none", "--patients", "0"], "patients = 0"),
@@ -150,7 +152,7 @@ def test_command_writes_table_json_and_figure(tmp_path, capsys):
     assert main(["evaluate", "--policy", "none", "--patients", "1", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "return" in printed and "evaluation.md" in printed
-    assert all(m.label in (tmp_path / "evaluation.md").read_text() for m in MEASURES)
+    assert all(m.label in (tmp_path / "evaluation.md").read_text() for m in MEASURES if not m.special)
     found = json.loads((tmp_path / "evaluation.json").read_text(), parse_constant=pytest.fail)
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 1
     assert (tmp_path / "evaluation.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"

@@ -6,7 +6,7 @@ import pytest
 from agents.environment import ENVIRONMENT, make
 from agents.evaluation.evaluate import evaluate
 from agents.policies.assist_as_needed import AssistAsNeeded, gaussians
-from agents.policies.baselines import POLICIES, policy
+from agents.policies.baselines import FOLLOWING, policy
 from agents.policies.compensation import ANGLES, CompensatedPid, holding_tensions
 from agents.policies.lagging_pid import LaggingPid
 from dms_core.errors import InputError
@@ -25,7 +25,7 @@ def made(used, seed=0, **settings):
     return env, observation, info
 
 
-@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize("name", FOLLOWING)
 def test_actions_are_in_the_box(name):
     used = policy(name)
     env, observation, info = made(used)

@@ -22,7 +22,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 SHIPPED = sorted((configs() / "agents").rglob("*.yml"))
 
 
-def zoo_worlds(section, evaluation):
+def zoo_worlds(section, evaluation, environment=ENVIRONMENT):
     """Worlds as rl_zoo3 2.9 makes them (exp_manager.py: create_envs; utils.py: get_wrapper_class).
 
     Those for training have the file's env_kwargs, those for evaluation what its command line says, here nothing. Its
@@ -40,15 +40,16 @@ def zoo_worlds(section, evaluation):
             env = kind(env, **kwargs)
         return env
 
-    spec = gymnasium.spec(ENVIRONMENT)
+    spec = gymnasium.spec(environment)
     kwargs = {} if evaluation else dict(section["env_kwargs"])
     return make_vec_env(lambda **k: spec.make(**k), n_envs=1, seed=0, env_kwargs=kwargs, wrapper_class=wrap)
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda p: str(p.relative_to(configs())))
 def test_training_and_evaluation_have_the_same_settings(path):
-    section = yaml.safe_load(path.read_text())[ENVIRONMENT]
-    training, evaluation = (zoo_worlds(section, which) for which in (False, True))
+    environment = Config.read(path).environment
+    section = yaml.safe_load(path.read_text())[environment]
+    training, evaluation = (zoo_worlds(section, which, environment) for which in (False, True))
     ones = [worlds.envs[0].unwrapped for worlds in (training, evaluation)]
     wanted = section["env_kwargs"]
     for one in ones:
@@ -56,7 +57,7 @@ def test_training_and_evaluation_have_the_same_settings(path):
     kept = [{k: v for k, v in one.spec.kwargs.items() if k != "render_mode"} for one in ones]
     assert kept[0] == kept[1]
     np.testing.assert_array_equal(training.reset(), evaluation.reset())
-    without = zoo_worlds({k: v for k, v in section.items() if k != "env_wrapper"}, True)
+    without = zoo_worlds({k: v for k, v in section.items() if k != "env_wrapper"}, True, environment)
     assert without.envs[0].unwrapped.spec.kwargs.keys().isdisjoint(wanted)
     for worlds in (training, evaluation, without):
         worlds.close()

@@ -34,7 +34,7 @@ def same(one, other):
     return one.keys() == other.keys() and all(np.array_equal(one[k], other[k]) for k in one)
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc", "recurrent_ppo"])
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc", "recurrent_ppo", "dagger"])
 def test_every_algorithm_trains_and_leaves_what_it_says(algorithm, tmp_path, capsys):
     path, out = config_file(tmp_path, algorithm), tmp_path / "run"
     assert train("--config", path, "--out", out) == 0
@@ -60,7 +60,7 @@ def test_seed_decides_the_weights(tmp_path):
     assert not same(weights(tmp_path / "a"), weights(tmp_path / "c"))
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "dagger"])
 def test_going_on_is_exact_where_it_can_be(algorithm, tmp_path):
     # The state goes on to the last bit: a run that goes on without a further step has the same files, and two copies
     # that go on are alike.
@@ -77,7 +77,7 @@ def test_going_on_is_exact_where_it_can_be(algorithm, tmp_path):
     assert len(read_record(tmp_path / "a")["sessions"]) == 2
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac", "recurrent_ppo"])
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "recurrent_ppo", "dagger"])
 def test_state_comes_back_to_the_last_bit(algorithm, tmp_path):
     import torch
 
@@ -99,6 +99,9 @@ def test_state_comes_back_to_the_last_bit(algorithm, tmp_path):
         assert torch.equal(value, other.policy.state_dict()[name])
     for one, two in ((model.get_vec_normalize_env(), other.get_vec_normalize_env()),):
         assert np.array_equal(one.obs_rms.mean, two.obs_rms.mean) and one.ret_rms.count == two.ret_rms.count
+    if algorithm == "dagger":
+        kept, back = model.demonstrations.columns, other.demonstrations.columns
+        assert len(kept["seen"]) == 2 and all(np.array_equal(kept[name], back[name]) for name in kept)
     if algorithm == "sac":
         assert torch.equal(model.log_ent_coef, other.log_ent_coef)
         assert model.replay_buffer.pos == other.replay_buffer.pos > 0
@@ -124,7 +127,7 @@ def wait_for(condition, running, seconds=300.0):
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "dagger"])
 def test_killed_at_any_moment_it_goes_on(algorithm, tmp_path):
     path, out = config_file(tmp_path, algorithm), tmp_path / "run"
     running = process("--config", path, "--out", out, "--set", "n_timesteps=1e6", "training.eval_every=1e6")

@@ -27,7 +27,7 @@ from tests.dms_core.assembly.specimen import (
 from tests.dms_core.linear.exact_norm import exact_norm
 from tests.dms_core.test_derivatives import CONCRETE, differences
 
-NOT_IN_A_SYSTEM_OF_RIGID_PARTS: set[str] = {"delayed_error"}
+NOT_IN_A_SYSTEM_OF_RIGID_PARTS: set[str] = {"delayed_error", "impedance_controller"}
 """Kinds that need companions of their own; their kernels stand in test_derivatives."""
 
 

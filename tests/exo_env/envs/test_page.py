@@ -3,8 +3,11 @@
 import inspect
 import re
 
+import numpy as np
 import pytest
 
+from exo_env.drives.assist_moment import AssistMoment
+from exo_env.drives.impedance import Impedance
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.envs.elbow_lift import ElbowLiftEnv
@@ -29,14 +32,20 @@ def test_it_has_the_sections_of_the_template():
     assert re.findall(r"^## (.*)$", PAGE, re.MULTILINE) == wanted
 
 
-@pytest.mark.parametrize(
-    ("table", "mode", "drive"), [(0, "rope_tension", RopeTension()), (1, "pid_setpoint", PidSetpoint())]
-)
-def test_actions(table, mode, drive):
+def _range_of_commands(drive, device):
+    """Least and most of what each component of an action means."""
+    if isinstance(drive, AssistMoment):
+        return np.array([[-drive.max_moment, 0.0], [drive.max_moment, drive.max_co_tension]])
+    offset, gain = drive.numbers(device).T
+    return offset - gain, offset + gain
+
+
+@pytest.mark.parametrize(("table", "mode"), list(enumerate(ElbowLiftEnv.drives)))
+def test_actions(table, mode):
     env, rows = ElbowLiftEnv(action_mode=mode), _tables("Action Space")[table]
-    assert [row[1] for row in rows] == list(drive.actions(env.ecosystem.device))
-    offset, gain = drive.numbers(env.ecosystem.device).T
-    low, high = offset - gain, offset + gain
+    assert len(_tables("Action Space")) == len(ElbowLiftEnv.drives) and f'`action_mode="{mode}"`' in PAGE
+    assert [row[1] for row in rows] == list(env.drive.actions(env.ecosystem.device))
+    low, high = _range_of_commands(env.drive, env.ecosystem.device)
     for k, (_, _, least, most, control_least, control_most, _) in enumerate(rows):
         assert (env.action_space.low[k], env.action_space.high[k]) == (float(least), float(most))
         assert (low[k], high[k]) == (float(control_least), float(control_most))
@@ -44,10 +53,13 @@ def test_actions(table, mode, drive):
 
 def test_numbers_in_the_text_are_those_of_the_settings():
     env = ElbowLiftEnv()
-    drive, limits, pid = RopeTension(), env.limits, PidSetpoint()
+    drive, limits, pid, law = RopeTension(), env.limits, PidSetpoint(), Impedance()
     for sentence in (
         f"{drive.rate_limit:g} N/s and follow with a lag of {drive.time_constant:g} s",
         f"filter of {pid.filter_frequency:g} rad/s; its authority changes by at most {pid.authority_rate:g} 1/s",
+        f"follows the hinge with a time constant of {law.relaxation_time:g} s, a damper",
+        f"follow this law with a lag of {law.time_constant:g} s",
+        f"changes by at most {law.change_rate:g} times its largest value in a second",
         f"the elbow leaves {limits.lowest_deg:g} to {limits.highest_deg:g} deg",
         "The elbow has stops at {:g} and {:g} deg".format(*env.ecosystem.arm().within_stops(-180.0, 180.0)),
         "`initial_angle_deg` ({:g} to {:g})".format(*env.ecosystem.arm().within_stops(*env.task.start_range())),

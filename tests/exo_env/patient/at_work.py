@@ -8,7 +8,7 @@ import numpy as np
 
 from exo_env.ecosystem.arm import Arm
 from exo_env.patient.effort import PRESENT, EffortState, new_effort, reset_effort, start_excitation, step_effort
-from exo_env.patient.patient import PATIENT, Patient
+from exo_env.patient.patient import MIDDLE, PATIENT, Patient
 
 MUSCLES, SIGN = Arm().muscles, Arm().signs
 
@@ -22,16 +22,21 @@ class AtWork:
             self.numbers[PATIENT.feedback_gain] = 0.0
         self.state: EffortState = new_effort(SIGN, period)
 
-    def reset(self, wanted: np.ndarray) -> np.ndarray:
+    def reset(self, wanted: np.ndarray, angle: float = MIDDLE) -> np.ndarray:
         """As one who has wanted `wanted` for long; gives the excitations of that, without tremor."""
         phase = self.generator.uniform(0.0, 2.0 * math.pi)
-        reset_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), phase)
+        reset_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), angle, phase)
         return np.array([start_excitation(self.state, k) for k in range(len(SIGN))])
 
-    def step(self, wanted: np.ndarray, *, error: float = 0.0, rate: float = 0.0) -> np.ndarray:
+    def step(
+        self, wanted: np.ndarray, *, error: float = 0.0, error_rate: float = 0.0, angle: float = MIDDLE,
+        rate: float = 0.0,
+    ) -> np.ndarray:  # fmt: skip
         """Excitations at the end of the coming period."""
         out, noise = np.empty(len(SIGN)), self.generator.standard_normal()
-        step_effort(self.numbers, self.state, self.period, np.asarray(wanted, float), error, rate, noise, out)
+        step_effort(
+            self.numbers, self.state, self.period, np.asarray(wanted, float), error, error_rate, angle, rate, noise, out
+        )
         return out
 
     @property

@@ -9,9 +9,9 @@ from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.patient.ability import MIDDLE, SMALLEST_SCALE, Need, ability, put_lacking, voluntary
+from exo_env.patient.ability import SMALLEST_SCALE, Need, ability, put_lacking, voluntary
 from exo_env.patient.motor_command import InternalModel, plan_course
-from exo_env.patient.patient import Patient
+from exo_env.patient.patient import MIDDLE, Patient
 from exo_env.tasks.repetition import Repetition
 
 DEVICE = Exoskeleton.from_config("exoskeletons/elbow.yaml")

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.patient.effort import new_effort, reset_effort, step_effort
 from exo_env.patient.fatigue import REST, L, advance_fatigue
-from exo_env.patient.patient import LONGEST_DELAY, Patient
+from exo_env.patient.patient import LONGEST_DELAY, MIDDLE, Patient
 from exo_env.patient.slacking import MOST_EFFORT, advance_effort
 from tests.exo_env.patient.at_work import MUSCLES, SIGN, AtWork
 
@@ -320,22 +320,24 @@ def test_states_of_a_batch_are_the_single_patients():
     generators = [np.random.default_rng(9) for _ in patients]
     singles = [AtWork(p, PERIOD, np.random.default_rng(9)) for p in patients]
     for k, patient in enumerate(patients):
-        for array in states[k][1:]:
-            array[:] = np.nan
-        reset_effort(patient.row(), states[k], PERIOD, RAMP[0], generators[k].uniform(0.0, 2.0 * np.pi))
+        # What the patient knows of the limb is put in place by another function.
+        for name in set(states[k]._fields) - {"sign", "limb", "levers"}:
+            getattr(states[k], name)[:] = np.nan
+        reset_effort(patient.row(), states[k], PERIOD, RAMP[0], MIDDLE, generators[k].uniform(0.0, 2.0 * np.pi))
         singles[k].reset(RAMP[0])
     for row in RAMP:
         for k, patient in enumerate(patients):
-            step_effort(patient.row(), states[k], PERIOD, row, 0.1, 0.7, generators[k].standard_normal(), out[k])
-            np.testing.assert_array_equal(out[k], singles[k].step(row, error=0.1, rate=0.7))
+            noise = generators[k].standard_normal()
+            step_effort(patient.row(), states[k], PERIOD, row, 0.1, 0.0, 1.0, 0.7, noise, out[k])
+            np.testing.assert_array_equal(out[k], singles[k].step(row, error=0.1, angle=1.0, rate=0.7))
     assert all(np.isfinite(array).all() for state in states for array in state)
 
 
 def test_an_arm_of_two_flexors_has_nothing_to_co_contract():
     patient, state, out = Patient(co_contraction=0.5), new_effort(np.ones(2), PERIOD), np.empty(2)
     wanted = np.array([0.3, 0.6])
-    reset_effort(patient.row(), state, PERIOD, wanted, 0.0)
-    step_effort(patient.row(), state, PERIOD, wanted, 0.0, 0.0, 0.0, out)
+    reset_effort(patient.row(), state, PERIOD, wanted, MIDDLE, 0.0)
+    step_effort(patient.row(), state, PERIOD, wanted, 0.0, 0.0, 1.0, 0.0, 0.0, out)
     np.testing.assert_array_equal(out, wanted)
 
 
@@ -347,3 +349,11 @@ def test_excitations_stay_within_the_limits_whatever_happens():
         u = effort.step(generator.random(6), rate=rate, error=error)
         assert np.all((u >= MINIMUM) & (u <= 1.0))
     assert 0.0 <= effort.effort <= MOST_EFFORT and np.all((effort.fatigued >= 0.0) & (effort.fatigued <= 1.0))
+
+
+def test_who_wants_more_than_is_left_drives_the_antagonists_no_further():
+    """Weak flexors at their ceiling, a large error: the triceps gets its share of what the flexors give."""
+    weak = _effort(maximum_activation_flexors=0.2, co_contraction=0.5, feedback_gain=3.0, feedback_delay=0.02)
+    found = _course(weak, np.full((5, 6), 0.2), error=np.full(5, 0.3))[-1]
+    np.testing.assert_allclose(found[FLEXES], 0.2, rtol=1e-14)
+    np.testing.assert_allclose(found[EXTENDS], 0.5 * 0.2, rtol=1e-14)

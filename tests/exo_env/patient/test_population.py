@@ -12,7 +12,7 @@ from exo_env.patient.distributions import distribution, weighted
 from exo_env.patient.patient import Patient
 from exo_env.patient.population import Population, population, shipped_populations
 
-SHIPPED = ("evaluation", "healthy", "mixed", "stroke_mild", "stroke_severe", "wide")
+SHIPPED = ("evaluation", "healthy", "mixed", "shifted", "stroke_mild", "stroke_severe", "wide")
 P = (np.arange(400) + 0.5) / 400
 """Probabilities at which quantiles are compared."""
 WORSE = {
@@ -50,7 +50,7 @@ def test_choice_and_constant():
     assert weighted((1.0, 0.0), 1.0) == 0
 
 
-def test_six_populations_are_shipped():
+def test_seven_populations_are_shipped():
     assert shipped_populations() == SHIPPED
 
 
@@ -67,7 +67,7 @@ def test_shipped_populations_give_patients(name):
 @pytest.mark.parametrize("name", [n for n in SHIPPED if n != "mixed"])
 def test_every_line_of_a_shipped_file_names_a_source_or_is_assumed(name):
     lines = (configs() / "patients" / f"{name}.yaml").read_text().splitlines()
-    if name in ("evaluation", "wide"):
+    if name in ("evaluation", "shifted", "wide"):
         assert any("All ranges are assumed" in line for line in lines)
         return
     begin = lines.index("fields:")
@@ -138,6 +138,28 @@ def test_evaluation_is_wider_and_shifted():
                 [np.mean([p.quantile(x) for x in P]) for p in parts], weights=list(mixed.mixture.values())
             )
             assert WORSE[field] * (np.mean([d.quantile(x) for x in P]) - trained) > 0.0, field
+
+
+def test_shifted_is_further_than_evaluation_by_its_rule():
+    mixed, near, far = (Population.shipped(name) for name in ("mixed", "evaluation", "shifted"))
+    assert far.distributions.keys() == near.distributions.keys()
+    for field, d in far.distributions.items():
+        if field == "sex":
+            continue
+        low, high = near.distributions[field].limits()
+        assert d.limits()[0] <= low and high <= d.limits()[-1], field
+        parts = np.array([[p.distributions[field].quantile(x) for x in P] for p in mixed.parts])
+        weights = np.array(list(mixed.mixture.values())) / sum(mixed.mixture.values())
+        mean = weights @ parts.mean(axis=1)
+        deviation = np.sqrt(weights @ (parts**2).mean(axis=1) - mean**2)
+        if hasattr(d, "normal"):
+            # Numbers of the file have two digits, a twentieth at most; 400 quantiles leave out the ends.
+            side = np.sign(near.distributions[field].normal.mean - mean)
+            wanted = mean + side * deviation
+            assert d.normal.mean == pytest.approx(wanted, abs=0.05 * wanted + 0.01 * deviation), field
+            assert d.normal.deviation == pytest.approx(1.5 * deviation, rel=0.06), field
+        else:
+            assert d.limits() in ((low, 2.0 * high), (0.5 * low, high)), field
 
 
 def test_body_mass_follows_height():
@@ -217,7 +239,7 @@ def test_mistakes_name_file_key_and_value(tmp_path, text, words):
 
 @pytest.mark.parametrize("source", ["nobody", 3, None, ["healthy"]])
 def test_unknown_population_lists_the_shipped(source):
-    with pytest.raises(InputError, match="evaluation, healthy, mixed, stroke_mild, stroke_severe"):
+    with pytest.raises(InputError, match="evaluation, healthy, mixed, shifted, stroke_mild"):
         population(source)
 
 

@@ -1,9 +1,12 @@
 """What electrodes show of activations."""
 
 import numpy as np
+import pytest
 
+from dms_core.errors import InputError
+from exo_env.envs.hidden_intent import HiddenIntentEnv
 from exo_env.patient.distributions import Draws
-from exo_env.tasks.electrodes import FAULTS, electrode_draws, put_envelopes
+from exo_env.tasks.electrodes import FAULTS, Electrodes, electrode_draws, put_envelopes
 
 ACTIVATIONS = np.array([0.6, 0.3, 0.0])
 
@@ -51,3 +54,37 @@ def test_what_is_drawn():
     assert 0.285 < gains.std() < 0.3 and abs(gains.mean() - 1.0) < 0.02
     assert abs((many[:, FAULTS.dropped] < 3.0).mean() - 0.2) < 4.0 * np.sqrt(0.2 * 0.8 / 4000)
     assert abs((many[:, FAULTS.renewed] < 1.0).mean() - 0.1) < 4.0 * np.sqrt(0.1 * 0.9 / 4000)
+
+
+def test_electrodes_may_be_worse():
+    muscles, never = ("a", "b"), {"uniform": [1.0, 2.0]}
+    worse = electrode_draws(muscles, never, Electrodes(gain_deviation=0.6, crosstalk=0.5, dropping=0.5))
+    draws = Draws({f"task.{k}": d for k, d in worse.items()})
+    many = np.array([draws.sample(np.uint64(k)) for k in range(4000)])
+    # Cut off at -1.2 and 1.7 deviations a normal distribution has 0.72 of its deviation.
+    assert 0.41 < many[:, len(FAULTS) :].std() < 0.45
+    assert 0.49 < many[:, FAULTS.crosstalk].max() <= 0.5
+    assert abs((many[:, FAULTS.dropped] < 2.0).mean() - 0.5) < 4.0 * np.sqrt(0.25 / 4000)
+    assert electrode_draws(muscles, never) == electrode_draws(muscles, never, Electrodes())
+
+
+@pytest.mark.parametrize(
+    ("electrodes", "said"),
+    [
+        (3, "electrodes = 3: expected a mapping with some of crosstalk, dropping, gain_deviation"),
+        ({"gain": 0.5}, "gain"),
+        ({"crosstalk": 1.5}, "crosstalk"),
+        ({"dropping": 0.0}, "dropping"),
+        ({"gain_deviation": float("nan")}, "gain_deviation"),
+    ],
+)
+def test_impossible_electrodes(electrodes, said):
+    with pytest.raises(InputError, match=said):
+        HiddenIntentEnv(electrodes=electrodes)
+
+
+def test_the_environment_takes_them():
+    env = HiddenIntentEnv(electrodes={"gain_deviation": 0.9})
+    assert env.task.electrodes == Electrodes(gain_deviation=0.9)
+    assert env.task.draws()["emg.crosstalk"] == HiddenIntentEnv().task.draws()["emg.crosstalk"]
+    assert env.task.draws() != HiddenIntentEnv().task.draws()

@@ -65,6 +65,16 @@ def test_no_channel_is_a_clock():
     np.testing.assert_array_equal(*found)
 
 
+def test_the_clock_is_a_group_of_its_own_that_no_fair_policy_sees():
+    env = HiddenIntentEnv(observation=["clock"])
+    assert env.reset(seed=3)[0] == 0.0
+    for k in range(1, 30):
+        assert env.step(NOTHING)[0] == pytest.approx(0.1 * k * env.period, rel=1e-6), "shown in tens of seconds"
+    assert "clock" in env.task.revealing
+    others = [c for name, channels in env.task.groups.items() if name != "clock" for c in channels]
+    assert not any(c.source == "clock" for c in others)
+
+
 def test_opposing_power():
     # Support of what arm and load need opposes nobody, up or down.
     assert opposing_power(3.0, 4.0, -1.0) == 0.0 and opposing_power(3.0, 4.0, 1.0) == 0.0

@@ -10,6 +10,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, SimulationError
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.patient.distributions import Draws, distribution
+from exo_env.patient.effort import TICK
 from exo_env.patient.motor_command import SETTLED, InternalModel, plan_course
 from exo_env.patient.patient import PATIENT, Patient, fields_of
 from exo_env.patient.population import Population, population
@@ -99,9 +100,11 @@ def test_the_command_is_that_of_the_internal_model(env):
     times = np.arange(round(env.duration / PLANNING) + 1) * PLANNING
     repetition = Repetition.of_row(episode.movement)
     planned = plan_course(known, times, repetition.course(times)).activations
-    wanted = np.array([np.interp(env.world.times, times, column) for column in planned.T]).T
+    ticks = TICK * np.arange(len(env.world.tables.patient.wanted))
+    wanted = np.array([np.interp(ticks, times, column) for column in planned.T]).T
     # Both iterations end within SETTLED of the same solution.
     np.testing.assert_allclose(env.world.tables.patient.wanted, wanted, atol=2.0 * SETTLED)
+    np.testing.assert_allclose(env.world.tables.patient.course, repetition.course(ticks), atol=1e-12)
 
 
 @pytest.mark.parametrize(
