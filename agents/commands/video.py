@@ -175,7 +175,7 @@ def band(width: int, title: str, event: str) -> np.ndarray:
     said = textwrap.wrap(event, LETTERS, max_lines=2, placeholder=" ...")
     lines += [(text, WARNING, FONT - 5, 26 + 16 * k) for k, text in enumerate(said)]
     for text, colour, size, y in lines:
-        line = _line(text, colour, size + 6, width)
+        line = _line(text, colour, size + 6, width - 8)
         surface.blit(line, ((width - line.get_width()) // 2, y))
     return pygame.surfarray.array3d(surface).swapaxes(0, 1)
 
@@ -185,9 +185,11 @@ def _line(text: str, colour: tuple[int, int, int], size: int, width: int) -> Any
     import pygame
 
     line = pygame.font.Font(None, size).render(text, True, colour)
-    if line.get_width() <= width:
-        return line
-    return pygame.font.Font(None, max(size * width // line.get_width(), 6)).render(text, True, colour)
+    # Letters come in whole pixels: their width does not shrink in proportion.
+    while line.get_width() > width and size > 6:
+        size -= 1
+        line = pygame.font.Font(None, size).render(text, True, colour)
+    return line
 
 
 def _shown(whole: Iterator[np.ndarray], progress: Callable[[], None], every: int) -> Iterator[np.ndarray]:
