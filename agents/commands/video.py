@@ -32,7 +32,7 @@ from .options import device_settings, different_policies, repeated
 BAND, FONT, MOST, SIZE = 60, 18, 4, 480
 """Height of the titles, size of their letters, policies that fit side by side, and width of each of them [pixel]."""
 LETTERS = 76
-"""Letters of a line below a title; a title has room for half as many."""
+"""Letters of a line below a title."""
 FADED = 0.55
 """Share of white in what stands still after the end of an episode [-]."""
 INK, WARNING, PAPER = (40, 40, 40), (190, 50, 20), (255, 255, 255)
@@ -171,13 +171,25 @@ def band(width: int, title: str, event: str) -> np.ndarray:
     pygame.font.init()
     surface = pygame.Surface((width, BAND))
     surface.fill(PAPER)
-    lines = [(textwrap.shorten(title, LETTERS // 2, placeholder=" ..."), INK, FONT, 4)]
+    lines = [(title, INK, FONT, 4)]
     said = textwrap.wrap(event, LETTERS, max_lines=2, placeholder=" ...")
     lines += [(text, WARNING, FONT - 5, 26 + 16 * k) for k, text in enumerate(said)]
     for text, colour, size, y in lines:
-        line = pygame.font.Font(None, size + 6).render(text, True, colour)
+        line = _line(text, colour, size + 6, width - 8)
         surface.blit(line, ((width - line.get_width()) // 2, y))
     return pygame.surfarray.array3d(surface).swapaxes(0, 1)
+
+
+def _line(text: str, colour: tuple[int, int, int], size: int, width: int) -> Any:
+    """A line of text, in smaller letters where it would be wider than `width` [pixel]."""
+    import pygame
+
+    line = pygame.font.Font(None, size).render(text, True, colour)
+    # Letters come in whole pixels: their width does not shrink in proportion.
+    while line.get_width() > width and size > 6:
+        size -= 1
+        line = pygame.font.Font(None, size).render(text, True, colour)
+    return line
 
 
 def _shown(whole: Iterator[np.ndarray], progress: Callable[[], None], every: int) -> Iterator[np.ndarray]:

@@ -26,7 +26,7 @@ def draw(path: Path, results: dict[str, Any]) -> None:
     # A panel of dots on one line would show less than the number.
     shown = [m for m in known if m.label not in equal] or known[:1]
     rows = -(-len(shown) // COLUMNS)
-    figure, axes = panels(rows, COLUMNS, (9.0, rows * (0.9 + 0.4 * len(names))), sharey=True)
+    figure, axes = panels(rows, COLUMNS, (9.0, 1.1 + rows * (0.8 + 0.4 * len(names))), sharey=True)
     for ax, m in zip(axes.flat, shown, strict=False):
         for k, name in enumerate(names):
             _row(ax, k, policies[name], m.name)

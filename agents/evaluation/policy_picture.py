@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from .patients_figure import ANGLE, wanted_curve
 from .time_course import TimeCourse
 
 ARM, DEVICE, MUSCLES = COLOURS[:3]
+LETTERS = 32
+"""Letters of a policy's title in a line."""
 NEEDED = (ANGLE, "reference", "exo_moment", "muscle_moment")
 """Readings that the picture is made of."""
 
@@ -41,7 +44,7 @@ def policy_picture(path: Path, ones: Sequence[TimeCourse], whom: str) -> None:
         if one.event is not None:
             for ax in (above, below):
                 ax.axvspan(one.columns["time"][-1], end, color=GONE, linewidth=0.0, zorder=0)
-        above.set_title(literal(f"{one.policy}\n{in_words(one)}"), fontsize=9, pad=14)
+        above.set_title(literal(f"{textwrap.fill(one.policy, LETTERS)}\n{in_words(one)}"), fontsize=9, pad=14)
         below.set_xlabel("time [s]")
     axes[0, 0].set_ylabel("elbow flexion [deg]")
     axes[1, 0].set_ylabel("moment at\nthe elbow [Nm]")

@@ -77,15 +77,23 @@ class History:
         self._values = [[np.array([line.of(s) for s in scenes]) for line in chart.lines] for chart in CHARTS]
         self._times = np.array([s.time for s in scenes])
         self._ranges = [_range(chart, compared) for chart in CHARTS]
+        self._done = 0
 
     def draw(self, count: int) -> np.ndarray:
-        """The strip after the first scenes, `count` of them: uint8, shape (height, size, 3)."""
+        """The strip after the first scenes, `count` of them: uint8, shape (height, size, 3).
+
+        A longer strip adds to the last one, a shorter one begins anew.
+        """
         canvas = self.canvas
-        canvas.clear(PAPER)
-        for k, (low, high) in enumerate(self._ranges):
-            self._frame(k, low, high)
-            for line, values in zip(CHARTS[k].lines, self._values[k], strict=True):
-                self._line(k, line, values[:count])
+        if count < self._done or self._done == 0:
+            canvas.clear(PAPER)
+            for k, (low, high) in enumerate(self._ranges):
+                self._frame(k, low, high)
+            self._done = 0
+        # Moment by moment, so that the same curve lies above where curves cross, however the strip came about.
+        for i in range(max(self._done - 1, 0), count - 1):
+            self._moment(i)
+        self._done = count
         canvas.smooth()
         for k, chart in enumerate(CHARTS):
             self._words(k, chart)
@@ -107,17 +115,12 @@ class History:
         for value in (low, high, *([0.0] if low < 0.0 < high else [])):
             self.canvas.line(self._place(k, ends, np.full(2, value)), FRAME, 0.6)
 
-    def _line(self, k: int, line: Line, values: np.ndarray) -> None:
-        """A curve as far as it has come, and where it is now."""
-        points = self._place(k, self._times[: len(values)], values)
-        if len(points) > 1:
-            pieces = [points]
-            if line.dashed:
-                pieces = [points[i : i + DASH + 1] for i in range(0, len(points) - 1, DASH + BLANK)]
-            for piece in pieces:
-                self.canvas.line(piece, line.colour, 1.4)
-        if not line.dashed:
-            self.canvas.disc(points[-1], 2.4, line.colour)
+    def _moment(self, i: int) -> None:
+        """All curves from a scene to the next one."""
+        for k, chart in enumerate(CHARTS):
+            for line, values in zip(chart.lines, self._values[k], strict=True):
+                if not line.dashed or i % (DASH + BLANK) < DASH:
+                    self.canvas.line(self._place(k, self._times[i : i + 2], values[i : i + 2]), line.colour, 1.4)
 
     def _words(self, k: int, chart: Chart) -> None:
         """Title, names of the curves and ends of the axis."""

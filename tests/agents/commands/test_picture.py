@@ -50,6 +50,17 @@ def test_a_column_a_policy_with_share_and_error_in_words(tmp_path, monkeypatch):
     assert len(figure.legends[0].get_texts()) == 4
 
 
+def test_long_titles_do_not_leave_their_column(tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(drawing, "save", lambda figure, path: shown.append(figure))
+    policy_picture(tmp_path / "a.png", [course("a policy of many words " * 3, measures=MEASURES)] * 3, "One patient")
+    (figure,) = shown
+    figure.canvas.draw()
+    for ax in figure.axes[:3]:
+        title, box = ax.title.get_window_extent(), ax.get_window_extent()
+        assert title.width < box.width + 20.0
+
+
 def test_words_where_nobody_moves():
     still = course(measures={"device_work_share": np.nan, "tracking_rms_deg": 0.0}, hidden=False)
     assert in_words(still) == "nobody moves\n0.0 deg off the reference (rms)"

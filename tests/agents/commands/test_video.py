@@ -60,6 +60,13 @@ def test_both_have_the_same_patient_and_one_that_ended_stands_still_in_grey():
     assert (np.ptp(second[BAND:, :SIZE], axis=-1) > 0).any() and (np.ptp(third[BAND:, :SIZE], axis=-1) == 0).all()
 
 
+def test_a_long_title_is_whole():
+    """Nothing of it is cut off at the edges, however long."""
+    for title in ("oracle: PID that knows plan, load and ability of the patient", "W" * 60):
+        shown = (band(SIZE, title, "") < 255).any(axis=(0, 2))
+        assert not shown[0] and not shown[-1] and np.ptp(np.flatnonzero(shown)) > 0.8 * SIZE
+
+
 def test_an_event_is_told_with_its_time():
     from agents.policies.baselines import policy
 

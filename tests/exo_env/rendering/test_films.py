@@ -91,6 +91,11 @@ def test_the_strip_grows_with_time_and_tells_policies_apart(scenes, words):
     begin, end = history.draw(1), history.draw(len(scenes))
     assert begin.shape == end.shape == (HEIGHT, 480, 3)
     assert not np.array_equal(begin, end)
+    # Step by step, at once and anew it is the same strip.
+    assert np.array_equal(history.draw(1), begin)
+    for count in (2, 3, 40, len(scenes)):
+        grown = history.draw(count)
+    assert np.array_equal(grown, end)
     assert {chart.title for chart in CHARTS} == {"flexion [deg]", "moment [Nm]", "effort [-]"}
     assert {"device", "muscles", "of the patient", "wanted", "arm"} <= set(words)
 
