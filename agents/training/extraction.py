@@ -68,12 +68,10 @@ def extract(
         seen = getattr(model.policy, "seen", slice(None))
         arrays |= {"mean": statistics.obs_rms.mean[seen].copy(), "variance": statistics.obs_rms.var[seen].copy()}
     output = "tanh" if _squashed(model) else "clip"
-    world: Any = env.unwrapped
-    told = {part.group for part in world.observation_structure} & set(world.task.revealing)
     description = Description(
         title=origin.title, algorithm=origin.algorithm, environment=origin.environment, exo_env=package_version(),
         env_kwargs=origin.env_kwargs, architecture=_architecture(model, arrays, output, env, statistics, origin),
-        steps=model.num_timesteps, seed=origin.seed, informed=bool(told), **world_facts(env),
+        steps=model.num_timesteps, seed=origin.seed, **world_facts(env),
     )  # fmt: skip
     return LearnedPolicy(description, arrays)
 
