@@ -8,7 +8,7 @@ the number:
 
     size      body and muscles: the numbers of the world are scaled with it (world/scaling.py)
     muscle    time constants of the muscles
-    effort    from the command to the excitations, in every control period (patient/effort.py)
+    effort    from the command to the excitations, at every tick of the patient (patient/effort.py)
     plan      what the patient expects when the command is planned (patient/motor_command.py)
     joint     a number of a joint's own element, in which the numbers of the world are linear (ecosystem/arm.py)
 """

@@ -118,8 +118,8 @@ MEASURES = (
     Measure("return", "return", "-", lambda r: math.fsum(r.rewards)),
     Measure("tracking_rms_deg", "tracking, rms", "deg", _tracking_rms, ("tracking_error",)),
     Measure("tracking_peak_deg", "tracking, peak", "deg", _tracking_peak, ("tracking_error",)),
-    Measure("device_work_share", "work of the device", "-", lambda r: _shares(r)[0], WORK),
-    Measure("patient_work_share", "work of the patient", "-", lambda r: _shares(r)[1], WORK),
+    Measure("device_work_share", "work of the device, share", "-", lambda r: _shares(r)[0], WORK),
+    Measure("patient_work_share", "work of the patient, share", "-", lambda r: _shares(r)[1], WORK),
     Measure("peak_tension_N", "peak tension", "N", lambda r: float(r.column(TENSION).max()), (TENSION,)),
     Measure(
         "peak_reaction_N", "peak elbow reaction", "N", lambda r: float(r.column("elbow_reaction").max()),

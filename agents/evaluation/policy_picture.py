@@ -44,7 +44,7 @@ def policy_picture(path: Path, ones: Sequence[TimeCourse], whom: str) -> None:
         above.set_title(literal(f"{one.policy}\n{in_words(one)}"), fontsize=9, pad=14)
         below.set_xlabel("time [s]")
     axes[0, 0].set_ylabel("elbow flexion [deg]")
-    axes[1, 0].set_ylabel("moment at the elbow [Nm]")
+    axes[1, 0].set_ylabel("moment at\nthe elbow [Nm]")
     axes[0, 0].set_xlim(0.0, end)
     stepped = "; dotted: the load changes, without notice" if any(one.load_steps for one in ones) else ""
     ends = [sentence for one in ones if (sentence := end_sentence(one))]

@@ -23,6 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from dms_core import Model, Simulation, SolverOptions, simulate
+from exo_env.rendering.panels import COLOURS, drawn, panels, save
+from exo_env.rendering.quantities import quantity
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.peer_table import MEASURED, Figure, PeerTable
@@ -31,8 +33,10 @@ from tests.benchmarks.problems import ANGLE, arm, chain, chain_error, chain_gap,
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 CHAIN = 8
-PANELS = {"elbow": "whole system, elbow angle [rad]", "arm26 co-contract": "arm26, elbow angle [rad]",
-          f"chain {CHAIN}": f"chain of {CHAIN} links, tip [m]"}  # fmt: skip
+PANELS = {"elbow": ("whole system", "error of the elbow angle [rad]"),
+          "arm26 co-contract": ("arm26", "error of the elbow angle [rad]"),
+          f"chain {CHAIN}": (f"chain of {CHAIN} links", "error of the tip's place [m]")}  # fmt: skip
+"""Title of each system's panel, and its error in words."""
 OURS = "exo-env"
 
 
@@ -88,31 +92,25 @@ def curves(figures: Sequence[Figure]) -> dict[str, list[Figure]]:
         gap = max(f.gap_m for f in found[name])
         # Below a micrometre joints count as closed.
         if gap > 1e-6:
-            found[f"{name} (joints open by {gap:.0e} m)"] = found.pop(name)
+            found[f"{name} (joints open by {quantity(gap, 'm', 1)})"] = found.pop(name)
     return found
 
 
-def draw(path: Path, rows: Sequence[Figure], peers: PeerTable) -> None:
-    """A panel a system."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(12, 4.2), layout="constrained")
-    for ax, (system, title) in zip(axes, PANELS.items(), strict=True):
-        mine = [(f.error, f.ms) for f in rows if f.system == system]
-        ax.loglog(*zip(*mine, strict=True), "o-", color="#0b6e4f", lw=2, label=OURS)
-        for k, (name, figures) in enumerate(curves(peers.of(system)).items()):
-            points = sorted((f.error, f.ms) for f in figures)
+@drawn
+def draw(path: Path, figures: Sequence[Figure]) -> None:
+    """A panel a system, its legend below it."""
+    figure, axes = panels(1, len(PANELS), (12.0, 5.2))
+    for ax, (system, (title, error)) in zip(axes.flat, PANELS.items(), strict=True):
+        here = [f for f in figures if f.system == system]
+        mine = [(f.error, f.ms) for f in here if f.program == OURS]
+        ax.loglog(*zip(*mine, strict=True), "o-", color=COLOURS[-1], lw=2, label=OURS)
+        for k, (name, ones) in enumerate(curves([f for f in here if f.program != OURS]).items()):
+            points = sorted((f.error, f.ms) for f in ones)
             style = "s^vDP*"[k % 6] + ("--" if len(points) > 1 else "")
-            ax.loglog(*zip(*points, strict=True), style, lw=1, ms=5, alpha=0.8, label=name)
-        ax.set(title=title, xlabel="error", ylabel="CPU time [ms] per simulated second")
-        # Room for the legend below the curves.
-        ax.set_ylim(bottom=0.05 * min(ms for _, ms in mine))
-        ax.grid(True, which="major", alpha=0.3)
-        ax.legend(fontsize=6.5, loc="lower left")
-    figure.savefig(path, dpi=110)
+            ax.loglog(*zip(*points, strict=True), style, color=COLOURS[k % 6], lw=1, ms=5, alpha=0.8, label=name)
+        ax.set(title=title, xlabel=error, ylabel="CPU time per simulated second [ms]")
+        ax.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.17), frameon=False)
+    save(figure, path)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -132,7 +130,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"{f.system:18} {f.program:16} {f.setting:36} {f.error:9.1e} {f.ms:8.2f} ms{gap}")
     for system in PANELS:
         print(f"others of {system}: {peers.origin(system)}")
-    draw(given.out / "work_precision.png", rows, peers)
+    draw(given.out / "work_precision.png", shown)
 
 
 if __name__ == "__main__":

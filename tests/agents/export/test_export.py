@@ -324,7 +324,7 @@ def test_weights_that_do_not_fit_are_named():
 def test_unknown_policies_are_named(tmp_path):
     (tmp_path / "a").touch()
     for name, said in (
-        ("nobody", "There are: assist_as_needed"), (str(tmp_path), "no policy.json"),
+        ("nobody", "There are: adaptive_gravity"), (str(tmp_path), "no policy.json"),
         (str(tmp_path / "nope"), "there is no such folder"), (str(tmp_path / "a"), "is a file: expected the folder"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=said):

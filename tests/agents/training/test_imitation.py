@@ -290,3 +290,22 @@ def test_vector_environments_have_a_length():
 
 def test_arguments_of_dagger_are_those_of_its_signature():
     assert set(arguments(Config.of(content("dagger"), "dagger"))) == {"batch_size", "n_epochs", "policy_kwargs"}
+
+
+def test_a_student_is_exported_as_all_others(tmp_path):
+    """Its folder, and the model.zip that Stable-Baselines3 writes, give the same numbers."""
+    out = tmp_path / "run"
+    assert train("--config", config_file(tmp_path, "dagger", normalize=False), "--out", out) == 0
+    assert main(["export", str(out), "--last", "--out", str(tmp_path / "policy")]) == 0
+    exported = LearnedPolicy.load(tmp_path / "policy")
+    model = next((out / "checkpoints").glob(f"*{exported.description.steps}")) / "model.zip"
+    more = ["--trust", "--algorithm", "dagger", "--action-mode", "rope_tension", "--no-onnx"]
+    assert main(["export", str(model), "--out", str(tmp_path / "zip"), *more]) == 0
+    again = LearnedPolicy.load(tmp_path / "zip")
+    assert all(np.array_equal(again.arrays[name], one) for name, one in exported.arrays.items())
+    runtime = pytest.importorskip("onnxruntime")
+    session = runtime.InferenceSession(str(tmp_path / "policy" / "policy.onnx"))
+    inputs = {one.name: np.zeros(one.shape, np.float32) for one in session.get_inputs()}
+    exported.network.reset()
+    wanted = exported.network(np.zeros(exported.description.architecture.observed, np.float32))
+    np.testing.assert_allclose(session.run(["action"], inputs)[0].ravel(), wanted, atol=1e-6)  # single precision

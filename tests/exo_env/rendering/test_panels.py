@@ -1,4 +1,4 @@
-"""Figures are drawn with matplotlib's own settings, whatever the user's say."""
+"""What all figures have in common: matplotlib's own settings, letters, legends, notes, and how they are written."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from dms_core.config_files import configs
+from exo_env.rendering.panels import legend, letter, note, save
+
+pytest.importorskip("matplotlib")
 
 DRAW = """
 import sys
@@ -43,3 +48,50 @@ def test_an_unknown_backend_is_named(tmp_path):
     done = run(tmp_path, "plain.png", MPLBACKEND="nonsense")
     said = done.stderr.splitlines()[-1]
     assert done.returncode == 1 and "nonsense" in said and "MPLBACKEND" in said and said.startswith("dms_core.errors.")
+
+
+def figure_of(columns):
+    from exo_env.rendering.panels import panels
+
+    figure, axes = panels(1, columns, (2.0 * columns, 2.0))
+    for k, ax in enumerate(axes.flat):
+        ax.plot([0, 1], [k, 1], label=f"line {k}")
+    return figure, axes
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def test_several_panels_have_letters_and_one_has_none(tmp_path):
+    figure, axes = figure_of(3)
+    axes[0, 1].set_visible(False)
+    save(figure, tmp_path / "a.png")
+    assert [texts(ax) for ax in axes.flat] == [["a"], [], ["b"]] and letter(figure, axes[0, 2]) == "b"
+    figure, axes = figure_of(1)
+    save(figure, tmp_path / "b.png")
+    assert texts(axes[0, 0]) == []
+
+
+def test_a_legend_names_the_lines_of_all_panels_once():
+    figure, axes = figure_of(2)
+    axes[0, 1].plot([0, 1], [1, 0], label="line 0")
+    legend(figure, 2, ["line 1"])
+    (found,) = figure.legends
+    assert [text.get_text() for text in found.get_texts()] == ["line 1", "line 0"]
+
+
+def test_a_note_is_wrapped_to_the_figure_and_begins_no_formula():
+    figure, _ = figure_of(1)
+    note(figure, ["what costs $5 and $6 " * 5])
+    lines = figure.get_supxlabel().split("\n")
+    assert len(lines) > 1 and "\\$5" in lines[0]
+    figure, _ = figure_of(1)
+    note(figure, [])
+    assert figure.get_supxlabel() == ""
+
+
+@pytest.mark.parametrize("name, begin", [("a.png", b"\x89PNG"), ("a.svg", b"<?xml"), ("a.pdf", b"%PDF")])
+def test_pictures_are_written_as_their_names_end(name, begin, tmp_path):
+    save(figure_of(2)[0], tmp_path / name)
+    assert (tmp_path / name).read_bytes().startswith(begin)
