@@ -105,7 +105,10 @@ def _load_networks(model: BaseAlgorithm, path: Path) -> None:
         raise
     except Exception as error:  # what a damaged archive of tensors raises has no common class
         said = brief(" ".join(str(error).split()) or type(error).__name__)
-        raise InputError(f"'{path}' does not hold the networks of this configuration: {said}") from None
+        raise InputError(
+            f"'{path}' does not hold the networks of this configuration. Where a version of the environment shows "
+            f"other channels than the one that a training began with, the training cannot go on: {said}"
+        ) from None
 
 
 def _running(statistics: VecNormalize) -> dict[str, Any]:

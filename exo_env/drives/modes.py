@@ -6,11 +6,12 @@ from exo_env.drives.impedance import Impedance
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 
-WITHOUT_REFERENCE: dict[str, type[Drive]] = {
+DRIVES: dict[str, type[Drive]] = {
     "rope_tension": RopeTension,
+    "pid_setpoint": PidSetpoint,
     "assist_moment": AssistMoment,
     "impedance": Impedance,
 }
-"""Those that need not know where the patient wants to go."""
-DRIVES: dict[str, type[Drive]] = WITHOUT_REFERENCE | {"pid_setpoint": PidSetpoint}
 """All of them."""
+WITHOUT_REFERENCE = {name: drive for name, drive in DRIVES.items() if drive is not PidSetpoint}
+"""Those that need not know where the patient wants to go."""
