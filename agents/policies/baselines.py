@@ -34,7 +34,7 @@ from .reference_free.emg_proportional import EmgProportional
 from .reference_free.gravity import Gravity, GravityLoad
 from .reference_free.mean_movement import MeanAngle, MeanClock
 from .reference_free.onset import Onset
-from .reference_free.oracle import Oracle
+from .reference_free.oracle import Oracle, SoftOracle
 
 
 class NoAssistance(BatchPolicy):
@@ -72,7 +72,7 @@ REFERENCE_FREE: dict[str, type[BatchPolicy]] = {
     p.name: p
     for p in (
         NoAssistance, Gravity, GravityLoad, EmgProportional, Admittance, AdaptiveGravity, Onset, DisturbanceObserver,
-        MeanClock, MeanAngle, Oracle,
+        MeanClock, MeanAngle, Oracle, SoftOracle,
     )
 }  # fmt: skip
 """Policies for tasks whose plan is hidden, with the oracle."""

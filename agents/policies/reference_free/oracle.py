@@ -64,3 +64,18 @@ class Oracle(AssistMoment):
         self._sum = self._sum + self.period * error - self.kept(FORGETTING) * self._sum
         towards = x["stiffness"] * error + x["integral"] * self._sum + x["damping"] * rate
         return x["share"] * told("lacking_moment")[0] + towards
+
+
+class SoftOracle(Oracle):
+    """The same with numbers of its own, chosen by hand: soft enough that a student who cannot see the plan can imitate
+    it. Of a stiff one a student learns to push at all times, and the patient leaves the work to the device."""
+
+    name, title = "soft_oracle", "soft oracle: the teacher of students"
+    ranges: ClassVar[dict[str, Range]] = {}
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.numbers = {
+            "share": 1.0, "stiffness": 30.0, "integral": 0.0, "dead_deg": 0.0, "damping": 4.0, "lead": 0.1,
+            "smoothing": 0.01,
+        }  # fmt: skip
