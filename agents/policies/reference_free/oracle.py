@@ -68,7 +68,8 @@ class Oracle(AssistMoment):
 
 class SoftOracle(Oracle):
     """The same with numbers of its own, chosen by hand: soft enough that a student who cannot see the plan can imitate
-    it. Of a stiff one a student learns to push at all times, and the patient leaves the work to the device."""
+    it. Of a stiff one a student learns to push at all times, and the patient leaves the work to the device.
+    """
 
     name, title = "soft_oracle", "soft oracle: the teacher of students"
     ranges: ClassVar[dict[str, Range]] = {}
