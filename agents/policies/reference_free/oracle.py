@@ -67,8 +67,9 @@ class Oracle(AssistMoment):
 
 
 class SoftOracle(Oracle):
-    """The same with numbers of its own, chosen by hand: soft enough that a student who cannot see the plan can imitate
-    it. Of a stiff one a student learns to push at all times, and the patient leaves the work to the device.
+    """The same with numbers of its own, chosen by hand: a teacher for students who cannot see the plan.
+
+    Of a stiff one a student learns to push at all times, and the patient leaves the work to the device.
     """
 
     name, title = "soft_oracle", "soft oracle: the teacher of students"
