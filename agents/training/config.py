@@ -73,7 +73,7 @@ class Training(Settings):
     imitation: Imitation | None = Field(default=None, description="of a teacher, by the algorithm dagger")
     initial: str | None = Field(
         default=None, min_length=1, max_length=4096,
-        description="trained policy whose networks learning begins with; named like a teacher",
+        description="trained policy whose networks learning begins with, as a teacher; of a training the newest",
     )  # fmt: skip
     held: int = Field(default=0, ge=0, le=MOST_STEPS, description="steps at the start in which only the critic learns")
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?|mps|auto)$", description="of PyTorch")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,8 +14,26 @@ from dms_core.errors import InputError
 from dms_core.files.json_text import brief
 from dms_core.validation import shown
 
+from ..checkpoint import Store
 from ..policies.learned import LearnedPolicy, find_policy
+from ..policies.policy import Policy
 from .extraction import Origin, actor_parameters, extract
+
+
+def initial_policy(name: str) -> Policy:
+    """The policy that a training begins with.
+
+    Args:
+        name: as `find_policy` takes it; the folder of a training means its newest policy, not the one of the best
+            return: a student becomes like its teacher, and its return may fall meanwhile.
+
+    Raises:
+        InputError: there is none.
+    """
+    folder = Path(name)
+    if (folder / "run.json").is_file() and not Store(folder / "checkpoints").empty:
+        return LearnedPolicy.load(Store(folder / "checkpoints").latest(), name)
+    return find_policy(name)
 
 
 def begin_with(model: BaseAlgorithm, name: str, env: gymnasium.Env, origin: Origin) -> None:
@@ -25,7 +44,7 @@ def begin_with(model: BaseAlgorithm, name: str, env: gymnasium.Env, origin: Orig
 
     Args:
         model: fresh.
-        name: of the policy, as `find_policy` takes it.
+        name: of the policy, as `initial_policy` takes it.
         env: one environment of the training.
         origin: what the model is trained with.
 
@@ -33,7 +52,7 @@ def begin_with(model: BaseAlgorithm, name: str, env: gymnasium.Env, origin: Orig
         InputError: the policy acts in another environment, or its networks have another shape.
     """
     try:
-        policy = find_policy(name)
+        policy = initial_policy(name)
         if not isinstance(policy, LearnedPolicy):
             raise InputError(f"policy '{name}' has no networks: expected a trained policy.")
         policy.reset(env)

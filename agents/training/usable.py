@@ -69,14 +69,14 @@ def check_other_policies(config: Config) -> None:
         InputError: names the key and the policy.
     """
     from ..environment import make
-    from ..policies.learned import find_policy
+    from .initial import initial_policy
     from .worlds import teacher_of
 
     if config.training.imitation is not None:
         teacher_of(config)
     if config.training.initial is not None:
         try:
-            find_policy(config.training.initial).reset(make(config.environment, **config.env_kwargs))
+            initial_policy(config.training.initial).reset(make(config.environment, **config.env_kwargs))
         except InputError as error:
             raise InputError(f"training.initial: {error}") from None
 

@@ -67,7 +67,7 @@ def test_the_shipped_list_can_be_trained(tmp_path):
     groups = in_order(planned((), (0, 1), (), tmp_path, None, variations))
     order = {Path(folder).name: k for k, group in enumerate(groups) for _, _, folder in group}
     assert len(order) == 2 * len(variations)
-    assert order["teacher_0"] < order["student_0"] < order["reinforced_0"]
+    assert order["student_0"] < order["reinforced_0"] and order["teacher_0"] < order["learned_teacher_0"]
     assert order["rope_teacher_1"] < order["rope_tension_1"] and order["no_teacher_0"] == 0
     contents = {Path(folder).name: content for group in groups for content, _, folder in group}
     settings = {n: next(v for k, v in c.items() if k != "training")["env_kwargs"] for n, c in contents.items()}

@@ -8,6 +8,7 @@ pytest.importorskip("sb3_contrib")
 import torch
 
 from agents.__main__ import main
+from agents.checkpoint import Store
 from agents.distributed.sweep import in_order, planned
 from agents.environment import ENVIRONMENT, make, make_vector
 from agents.policies.learned import LearnedPolicy, find_policy
@@ -15,6 +16,7 @@ from agents.training.algorithms import arguments, build
 from agents.training.config import Config
 from agents.training.dagger import Dagger
 from agents.training.demonstrations import Demonstrations
+from agents.training.initial import initial_policy
 from agents.training.teacher import Teacher
 from agents.training.worlds import wrapped
 from dms_core.errors import InputError
@@ -159,7 +161,8 @@ def test_learning_goes_on_with_the_networks_of_another_policy(teacher, tmp_path)
     """With held networks the first policy is the student, and it stays it; then it learns on."""
     first, second = tmp_path / "student", tmp_path / "on"
     assert train("--config", student(tmp_path, teacher), "--out", first) == 0
-    known = find_policy(str(first))
+    known, newest = initial_policy(str(first)), LearnedPolicy.load(Store(first / "checkpoints").latest())
+    assert known.description.steps == newest.description.steps > 0, "the newest, not the one of the best return"
     path = config_file(
         tmp_path, "recurrent_ppo", training={"initial": "../student", "critic": ["privileged"], "held": 64},
         env_kwargs=SEEN,
