@@ -53,9 +53,13 @@ demo: $(STAMP)
 	$(BIN)/python -m agents evaluate --policy pid none pid_yielding pid_compensated assist_as_needed learned \
 	    --patients 20 --out $(OUT)/evaluation
 	$(BIN)/python -m agents report $(OUT)/evaluation --policies pid learned --out $(OUT)/report
-	$(BIN)/python -m agents video --policy none pid learned --patient stroke_severe --out $(OUT)/assist.mp4 --overwrite
+	$(BIN)/python -m agents evaluate --env exo/HiddenIntent-v0 --policy none learned \
+	    --population evaluation --patients 20 --seed 1 --out $(OUT)/intent
+	$(BIN)/python -m agents video --env exo/HiddenIntent-v0 --policy none learned oracle --patient stroke_severe --seed 3 \
+	    --out $(OUT)/intent.mp4 --overwrite
 	@echo "In $(abspath $(OUT)): figures of the paper in scenarios, tables and figures of the policies in report/report.md,"
-	@echo "all measures of 20 patients in evaluation, a severe patient alone, with the PID and with the policy in assist.mp4"
+	@echo "all measures of 20 patients in evaluation and, where the plan is hidden, in intent; a severe patient alone, with"
+	@echo "the learned policy and with one that knows the plan in intent.mp4"
 
 test: $(TRAIN_STAMP)
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"

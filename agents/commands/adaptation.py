@@ -68,7 +68,7 @@ def adaptation(
     check_hides_plan(environment, USUAL)
     windows = windows_of(environment)
     require_matplotlib()
-    used = with_opponents(different_policies(policy_names), environment)
+    used = with_opponents(different_policies(policy_names, environment), environment)
     plan, behind = Plan(population, patients, seed, (), environment), hindsight_set(environment, tries, seed)
     inputs: list[str | Path] = [population, *(Path(name) for name in policy_names if name not in shipped_policies())]
     command = f"{PROGRAM} adaptation --policy {shlex.join(policy_names)} --population {shlex.quote(population)}"

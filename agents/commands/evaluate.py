@@ -65,7 +65,7 @@ def evaluate(
         raise InputError("--policy: expected one or more names.")
     # First: it may be what registers the environment that a policy was trained in.
     environment_id(environment)
-    used = with_opponents(different_policies(policy_names), environment)
+    used = with_opponents(different_policies(policy_names, environment), environment)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     plan = Plan(population, patients, seed, loads, environment, settings)
     inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]

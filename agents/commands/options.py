@@ -14,12 +14,24 @@ from ..checkpoint import Store
 from ..distributed.cluster import connected
 from ..environment import hides_plan
 from ..evaluation.shares import ShareOut, processes
-from ..policies.learned import DESCRIPTION, SHIPPED, LearnedPolicy, find_policy, repetitions_of, shipped_policies
+from ..policies.learned import (
+    DESCRIPTION,
+    SHIPPED,
+    LearnedPolicy,
+    find_policy,
+    repetitions_of,
+    shipped_for,
+    shipped_policies,
+)
 from ..policies.policy import Policy
 
 
-def different_policies(names: Sequence[str]) -> list[Policy]:
+def different_policies(names: Sequence[str], environment: str | None = None) -> list[Policy]:
     """Policies by what a user calls them (see `find_policy`), no two of them the same under two names.
+
+    Args:
+        names: of the policies.
+        environment: id of the one that they are to act in.
 
     Raises:
         InputError: there is none of a name, or two are the same.
@@ -27,18 +39,18 @@ def different_policies(names: Sequence[str]) -> list[Policy]:
     found: dict[Any, str] = {}
     policies = []
     for name in names:
-        policies.append(find_policy(name))
-        first = found.setdefault(_identity(name, policies[-1]), name)
+        policies.append(find_policy(name, environment))
+        first = found.setdefault(_identity(name, policies[-1], environment), name)
         if len(found) < len(policies):
             raise InputError(f"policies '{first}' and '{name}' are the same one: expected different policies.")
     return policies
 
 
-def _identity(name: str, one: Policy) -> Any:
+def _identity(name: str, one: Policy, environment: str | None) -> Any:
     """What a policy is under any name: its class, or the folder that a trained one was read from."""
     if type(one) is not LearnedPolicy:
         return type(one)
-    folder = SHIPPED / name if name in shipped_policies() else Path(name)
+    folder = SHIPPED / shipped_for(name, environment) if name in shipped_policies() else Path(name)
     return (folder if (folder / DESCRIPTION).is_file() else Store(folder / "best").latest()).resolve()
 
 

@@ -50,7 +50,7 @@ def picture(
         raise InputError(f"output '{out}': expected a name that ends in {', '.join(FORMATS)}.")
     require_matplotlib()
     environment_id(environment)
-    used, settings = different_policies(policy_names), device_settings(exoskeleton)
+    used, settings = different_policies(policy_names, environment), device_settings(exoskeleton)
     inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
     with Outputs("picture", files=[OutputFile("--out", out)], inputs=inputs, overwrite=overwrite) as outputs:
         ones: list[TimeCourse] = []

@@ -128,7 +128,7 @@ def _shown(
     if names:
         if len(names) != 2:
             raise InputError(f"--policies {' '.join(names)}: expected two different names.")
-        return different_policies(names)
+        return different_policies(names, place)
     evaluated = evaluations[0]["policies"] if evaluations else {}
     ranked = sorted(evaluated, key=lambda n: evaluated[n]["summary"]["return"]["value"], reverse=True)
     learned = [n for n in ranked if n not in POLICIES] + [str(path) for path, curve in trainings.items() if curve]
@@ -137,7 +137,7 @@ def _shown(
     for name in dict.fromkeys([*learned[:1], *baselines]):
         # The folder of a policy that was evaluated may be gone.
         if name in POLICIES or name in shipped_policies() or Path(name).is_dir():
-            shown.append(find_policy(name))
+            shown.append(find_policy(name, place))
     return [policy for policy in shown if _fits(policy, place)][:2]
 
 

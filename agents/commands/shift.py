@@ -73,7 +73,7 @@ def shift(
     check_hides_plan(environment, USUAL)
     require_matplotlib()
     chosen = shifts or tuple(SHIFTS)
-    used = with_opponents(different_policies(policy_names), environment)
+    used = with_opponents(different_policies(policy_names, environment), environment)
     plan = Plan(population, patients, seed, (), environment)
     keys = [(name, size, one) for name in chosen for size in SHIFTS[name].sizes for one in used]
     planned: list[Cell] = [(one, SHIFTS[name].plan(plan, one, size)) for name, size, one in keys]

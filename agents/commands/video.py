@@ -67,7 +67,7 @@ def video(
     if out.suffix not in (".mp4", ".gif"):
         raise InputError(f"output '{out}': expected a name that ends in .mp4 or .gif.")
     environment_id(environment)
-    used = different_policies(policy_names)
+    used = different_policies(policy_names, environment)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     out = _possible(out)
     inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]

@@ -73,4 +73,4 @@ def with_opponents(policies: Sequence[Policy], environment: str) -> list[Policy]
     names = {one.name for one in policies}
     # None of them is a policy's own class, whose name a user may have taken.
     needed = dict.fromkeys([*map(opponent_of, policies), oracle_name()])
-    return [*policies, *(find_policy(name) for name in needed if name not in names)]
+    return [*policies, *(find_policy(name, environment) for name in needed if name not in names)]

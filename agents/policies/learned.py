@@ -282,12 +282,13 @@ def _warn_of_first_format(folder: Path) -> None:
     )
 
 
-def find_policy(name: str) -> Policy:
+def find_policy(name: str, environment: str | None = None) -> Policy:
     """A policy by what a user calls it.
 
     Args:
         name: a baseline or a shipped policy; the folder of a trained one, or of its training; or "module:Class" for a
             class of your own, see `Policy`.
+        environment: id of the one that it is to act in; of shipped policies the one for it is taken, see `shipped_for`.
 
     Raises:
         InputError: there is none; says how a .zip of Stable-Baselines3 becomes one.
@@ -295,7 +296,7 @@ def find_policy(name: str) -> Policy:
     if name in POLICIES:
         return baseline(name)
     if name in shipped_policies():
-        return LearnedPolicy.load(SHIPPED / name, name)
+        return LearnedPolicy.load(SHIPPED / shipped_for(name, environment), name)
     folder = Path(name)
     if folder.suffix == ".zip":
         raise InputError(
@@ -364,6 +365,14 @@ def repetitions_of(policies: Sequence[Policy], given: int | None = None) -> int:
             "evaluation of both."
         )
     return next(iter(learned.values()), 1)
+
+
+def shipped_for(name: str, environment: str | None) -> str:
+    """Folder of a shipped policy: where that of the name learned another task, one named NAME_... that learned this."""
+    folders = [name, *(x for x in shipped_policies() if x.startswith(f"{name}_"))]
+    if environment is None or len(folders) == 1:
+        return name
+    return next((x for x in folders if LearnedPolicy.load(SHIPPED / x).knows(environment)), name)
 
 
 def shipped_policies() -> list[str]:
