@@ -16,8 +16,8 @@ OLDEST_GYMNASIUM := 1.2.0
 .PHONY: help demo test test-slow test-oldest test-rllib fuzz bench bench-peers lint format docs clean
 
 help:
-	@echo "make demo   the paper's four scenarios, then baselines and the learned policy: figures, tables, video, into $(OUT)"
-	@echo "            (two minutes; the first time six more, for installing and compiling)"
+	@echo "make demo   the paper's four scenarios, then baselines and learned policies: figures, tables, film, into $(OUT)"
+	@echo "            (three minutes; the first time six more, for installing and compiling)"
 	@echo "make test   the tests (four minutes on two idle cores; the first time six more)"
 	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
@@ -27,7 +27,7 @@ help:
 	@echo "make bench-peers  time Exudyn, MuJoCo and MyoSuite in the same way; \`make bench\` prints ratios to them"
 	@echo "make lint   ruff and mypy"
 	@echo "make format rewrite the sources in the project's layout"
-	@echo "make docs   generate docs/model-files.md and the picture of the README"
+	@echo "make docs   generate docs/model-files.md, the scenarios and the picture of the README"
 	@echo "make clean  remove .venv, out, build products and compiled kernels"
 	@echo "Variables: PYTHON=$(PYTHON) makes .venv, OUT=$(OUT) takes results, WORKERS=$(WORKERS) run tests side by side"
 
@@ -120,6 +120,8 @@ docs: $(STAMP)
 	$(BIN)/python -m dms_core schema --out docs/model-files.md --overwrite
 	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
 	cp $(OUT)/scenarios/fig12_joint_moments.png docs/scenarios.png
+	$(BIN)/python -m agents picture --policy none adaptive_gravity learned oracle --patient stroke_severe --seed 3 \
+	    --out docs/hidden-intent.png --overwrite
 
 clean:
 	rm -rf .venv .venv-peers out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
