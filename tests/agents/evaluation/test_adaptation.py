@@ -66,7 +66,8 @@ def test_a_batch_gives_what_one_world_does():
 
 
 def test_an_episode_that_ends_early():
-    fallen = Plan("evaluation", 1, 5, (), NEW, {**SHORT, "limits": {"lowest_deg": 19.0, "highest_deg": 60.0}})
+    narrow = {"reference": {"start_deg": 30.0}, "limits": {"lowest_deg": 19.0, "highest_deg": 40.0}}
+    fallen = Plan("evaluation", 1, 7, (), NEW, {**SHORT, **narrow})
     fallen_batch = window_returns(policy("none"), fallen, fallen.cases)
     fallen_single = window_returns(Alone(), fallen, fallen.cases)
     assert fallen_batch[0]["unsafe"] and fallen_single[0]["unsafe"], "an arm that nobody holds drops"
