@@ -13,7 +13,7 @@ from exo_env.ecosystem.sensors import FOREARM_IMU
 from exo_env.patient.distributions import Distribution
 from exo_env.places import places
 from exo_env.settings import Settings, given_mapping
-from exo_env.tables import DRAW, DRIVE, PLAN, WORLD
+from exo_env.tables import DRAW, PLAN, WORLD
 from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading
 from exo_env.tasks.checked import begins
 from exo_env.tasks.elbow import (
@@ -25,28 +25,13 @@ from exo_env.tasks.elbow import (
     privileged_channels,
     read_elbow,
 )
+from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
 from exo_env.tasks.electrodes import Electrodes, electrode_draws, put_envelopes
 from exo_env.tasks.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
 from exo_env.tasks.intentions import Intentions
-from exo_env.tasks.limits import EVENTS, Limits, exceeded, limit_sentence
 from exo_env.tasks.movement import Movement
-from exo_env.tasks.rewards import term_values
-from exo_env.tasks.task import (
-    NOTHING,
-    Reported,
-    Task,
-    Values,
-    end_with,
-    event_of,
-    first_of,
-    readings,
-    step_of,
-    task_numbers,
-    terms_of,
-)
+from exo_env.tasks.task import Reported, first_of, readings, step_of, terms_of
 
-PREVIEW = (0.1, 0.2, 0.4)
-"""How far ahead the plan is tabulated for those who are shown it [s]; assumed."""
 EPISODES_RENEWED = 0.1
 """Share of the episodes in which electrodes are put on anew; assumed."""
 
@@ -78,9 +63,8 @@ def read_intent(w):
     """Fill the readings of `intent_readings` that no sensor gives."""
     read_elbow(w)
     r, at, plan, k = readings(w), first_of(w), inner(w, WORLD.plan), step_of(w)
-    preview, course = matrix(plan, PLAN.preview), matrix(plan, PLAN.course)
-    for i in range(preview.shape[1]):
-        r[at[INTENT.preview] + i] = preview[k, i]
+    course = matrix(plan, PLAN.course)
+    put_preview(w, at[INTENT.preview])
     m = at[INTENT.reaction] - at[INTENT.activation]
     put_envelopes(
         r[at[INTENT.activation] : at[INTENT.activation] + m], floats(inner(w, WORLD.draw), DRAW.task),
@@ -96,19 +80,12 @@ def read_intent(w):
 @compiled
 def judge_intent(w):
     """Check the limits, then fill the reward terms of intent_rewards.py."""
-    r, at, plan, drive = readings(w), first_of(w), inner(w, WORLD.plan), inner(w, WORLD.drive)
-    reaction, scale, terms = r[at[ELBOW.reaction]], floats(plan, PLAN.scale)[0], terms_of(w)
-    tensions = r[at[ELBOW.tension] : at[ELBOW.muscle_moment]]
-    if event_of(w) == NOTHING:
-        end_with(w, exceeded(task_numbers(w), r[at[ELBOW.angle]], tensions, reaction))
-    term_values(
-        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], lacking_of(w), scale, reaction,
-        floats(drive, DRIVE.action), floats(drive, DRIVE.before), event_of(w) != NOTHING, terms,
-    )  # fmt: skip
-    terms[INTENT_TERM.opposition] = opposition(r[at[INTENT.opposing_power]], scale)
+    judge_elbow(w)
+    power = readings(w)[first_of(w)[INTENT.opposing_power]]
+    terms_of(w)[INTENT_TERM.opposition] = opposition(power, floats(inner(w, WORLD.plan), PLAN.scale)[0])
 
 
-class HiddenIntentTask(Task):
+class HiddenIntentTask(ElbowTask):
     """The task: help the patient to where the patient wants, as much as is needed, against nobody.
 
     Args:
@@ -122,11 +99,7 @@ class HiddenIntentTask(Task):
     """
 
     weights_type: ClassVar[type[Settings]] = IntentWeights
-    limits_type: ClassVar[type[Settings]] = Limits
     movement_type: ClassVar[type[Movement]] = Intentions
-    limits: Limits
-    events: ClassVar[tuple[str, ...]] = EVENTS
-    preview: ClassVar[tuple[float, ...]] = PREVIEW
     # A worn device does not know when an episode began; the clock is there to measure what that would be worth.
     revealing: ClassVar[tuple[str, ...]] = ("privileged", "clock")
     reported: ClassVar[tuple[Reported, ...]] = (
@@ -187,15 +160,6 @@ class HiddenIntentTask(Task):
     def renewed(self) -> object:
         """Distribution of the part of the episode after which electrodes are put on anew; above 1 for never."""
         return {"uniform": [0.0, 1.0 / EPISODES_RENEWED]}
-
-    def start_range(self) -> tuple[float, float]:
-        """The limits of the elbow [deg]."""
-        return self.limits.lowest_deg, self.limits.highest_deg
-
-    def sentence(self, event: str, values: Values) -> str:
-        """A sentence on the limit that was passed."""
-        angle, reaction = float(values("angle")[0]), float(values("reaction")[0])
-        return limit_sentence(event, self.limits, angle, float(values("tension").max()), reaction)
 
 
 class NewPatientTask(HiddenIntentTask):
