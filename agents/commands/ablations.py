@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,6 +20,7 @@ from ..evaluation.evaluate import Plan
 from ..evaluation.kept_shares import forget
 from ..evaluation.key_figures import FIGURES, HEADS, MEANS, cells, columns, key_figures, measured_episodes
 from ..evaluation.opponents import opponent_of, oracle_name, with_opponents
+from ..evaluation.tables import records_text
 from ..policies.learned import find_policy
 from ..policies.policy import Policy
 from .kept_cells import run_cells
@@ -106,16 +105,11 @@ def _rows(
 
 def _numbers(rows: Sequence[Row], patients: int, command: str) -> str:
     """A row a variation, below a line with the command."""
-    text = io.StringIO()
-    text.write(f"# {printable(command)}\n")
     records: list[Mapping[str, Any]] = [
         {"variation": name, "trainings": count, "opponent": against, "patients": patients, **columns(found)}
         for name, count, against, found in rows
     ]
-    writer = csv.DictWriter(text, list(records[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(records)
-    return text.getvalue()
+    return records_text(records, command)
 
 
 def _text(rows: Sequence[Row], plan: Plan, command: str) -> str:

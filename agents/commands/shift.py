@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,6 +22,7 @@ from ..evaluation.key_figures import FIGURES, HEADS, MEANS, cells, columns, key_
 from ..evaluation.line_figures import Curve, draw_panels, line_titles
 from ..evaluation.opponents import opponent_of, oracle_name, with_opponents
 from ..evaluation.shift import SHIFTS
+from ..evaluation.tables import records_text
 from ..policies.learned import shipped_policies
 from ..policies.policy import Policy
 from .kept_cells import run_cells
@@ -79,6 +78,7 @@ def shift(
     planned: list[Cell] = [(one, SHIFTS[name].plan(plan, one, size)) for name, size, one in keys]
     inputs: list[str | Path] = [population, *(Path(name) for name in policy_names if name not in shipped_policies())]
     command = f"{PROGRAM} shift --policy {shlex.join(policy_names)} --population {shlex.quote(population)}"
+    command += f" --shifts {' '.join(shifts)}" if shifts else ""
     command += f" --patients {patients} --seed {seed} --env {environment}"
     with Outputs("shift", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
         episodes = run_cells(measured_episodes, planned, out, workers, address)
@@ -107,16 +107,11 @@ def _rows(
 
 def _numbers(rows: Sequence[Row], patients: int, command: str) -> str:
     """A row a shift, size and policy, below a line with the command."""
-    text = io.StringIO()
-    text.write(f"# {printable(command)}\n")
     records = [
         {"shift": name, "size": f"{size:g}", "policy": one.name, "patients": patients, **columns(found)}
         for name, size, one, found in rows
     ]
-    writer = csv.DictWriter(text, list(records[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(records)
-    return text.getvalue()
+    return records_text(records, command)
 
 
 def _text(rows: Sequence[Row], plan: Plan, command: str) -> str:

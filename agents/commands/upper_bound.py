@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shlex
 from typing import Annotated
 
@@ -12,12 +10,13 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
-from dms_core.errors import Stopped, counted, printable
+from dms_core.errors import Stopped, counted
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs, partial
 
 from ..environment import ENVIRONMENT, PROGRAM
 from ..evaluation.evaluate import check_numbers
+from ..evaluation.tables import records_text
 from ..evaluation.upper_bound import Tried, best_together
 from ..evaluation.upper_bound import upper_bound as bound
 from .options import device_settings
@@ -99,9 +98,5 @@ def rows_of(results: list[Tried], repetitions: int) -> list[dict[str, float]]:
 
 def _table(rows: list[dict[str, float]], options: str) -> str:
     """Rows as CSV, below a line with the command."""
-    text = io.StringIO()
-    text.write(f"# {PROGRAM} upper-bound {printable(options)}\n")
-    writer = csv.DictWriter(text, rows[0], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: v if k in WHOLE else f"{v:.4g}" for k, v in row.items()} for row in rows)
-    return text.getvalue()
+    records = [{k: v if k in WHOLE else f"{v:.4g}" for k, v in row.items()} for row in rows]
+    return records_text(records, f"{PROGRAM} upper-bound {options}")

@@ -5,6 +5,8 @@ What is estimated is the interquartile mean over the patients; of differences an
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,16 @@ SHORT = {
 """Measures of the short table beside the return, and their heads."""
 LEAST = 1e-6
 """Least number that is printed as one, in the unit of any measure; what is below is 0."""
+
+
+def records_text(records: Sequence[Mapping[str, Any]], command: str) -> str:
+    """Records of the same keys as CSV, below a line with the command that made them."""
+    text = io.StringIO()
+    text.write(f"# {printable(command)}\n")
+    writer = csv.DictWriter(text, list(records[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(records)
+    return text.getvalue()
 
 
 def statistic(results: Mapping[str, Any]) -> str:

@@ -146,7 +146,7 @@ class LearnedPolicy(Policy):
         folder = Path(folder)
         facts = read_json(folder / DESCRIPTION, MOST_DESCRIPTION)
         content = read_bytes(folder / WEIGHTS, MOST_WEIGHTS)
-        description = checked(Description, facts, f"policy '{folder}': {DESCRIPTION}")
+        description = _described(facts, folder)
         try:
             _check_registered(description.environment)
             _check_whole(description, facts, content)
@@ -224,7 +224,7 @@ class LearnedPolicy(Policy):
 
     @property
     def _task(self) -> type[Task]:
-        return task_type(environment_id(self.description.environment, say=False))
+        return _task_of(self.description)
 
     def _say_where(self, env: gymnasium.Env) -> None:
         """Say where an environment is another one that shows and takes the same: it may reward something else."""
@@ -245,6 +245,16 @@ class LearnedPolicy(Policy):
         if not self._known:
             raise InputError(f"policy '{self.name}' acts without a begin: call reset(env) after the environment's own.")
         return self.network(observation)
+
+
+def _described(facts: Any, folder: Path) -> Description:
+    """What the contents of a policy's description say."""
+    return checked(Description, facts, f"policy '{folder}': {DESCRIPTION}")
+
+
+def _task_of(description: Description) -> type[Task]:
+    """The task that a policy was trained for, in the newest version of its environment."""
+    return task_type(environment_id(description.environment, say=False))
 
 
 def _variants(one: type[Task], other: type[Task]) -> bool:
@@ -372,7 +382,14 @@ def shipped_for(name: str, environment: str | None) -> str:
     folders = [name, *(x for x in shipped_policies() if x.startswith(f"{name}_"))]
     if environment is None or len(folders) == 1:
         return name
-    return next((x for x in folders if LearnedPolicy.load(SHIPPED / x).knows(environment)), name)
+    task = task_type(environment)
+    for folder in folders:
+        path = SHIPPED / folder
+        # Weights tell nothing of the task, and a policy that is not taken need not be whole.
+        description = _described(read_json(path / DESCRIPTION, MOST_DESCRIPTION), path)
+        if _variants(_task_of(description), task):
+            return folder
+    return name
 
 
 def shipped_policies() -> list[str]:
