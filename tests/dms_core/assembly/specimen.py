@@ -230,8 +230,8 @@ def scales(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def random_point(model: Model, seed: int) -> Point:
-    """About the start, off the constraints; the fibre shortens, so that no kink of its curves is near."""
-    rng = np.random.default_rng(seed)
+    """About the start, off the constraints; the fibre shortens, and no kink of its curves is near these draws."""
+    rng = np.random.default_rng([seed, 1])
     by_q, by_v = scales(model)
     n = model.n_q
     q = model.start.q + 0.02 * by_q * rng.uniform(-1.0, 1.0, n)

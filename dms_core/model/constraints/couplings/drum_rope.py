@@ -5,7 +5,8 @@
 l is the length of the path from the drum to the rope's end. The path begins where the rope leaves the drum, a point
 that is fixed on the body that carries the drum, at the rim. The multiplier is the tension [N]: it pulls at both ends of
 the path, and turns the drum with the moment tau r. Two ropes on one drum, one paid out as the other is taken up, are a
-rope that runs over the drum without slip.
+rope that runs over the drum without slip. The pull at the path's first point goes to the carrier itself, and is no part
+of the reaction in the drum's bearing.
 
 The angle is known but for whole turns, and so is the row but for whole circumferences: the value nearest to 0 is right
 after any number of turns.

@@ -4,11 +4,11 @@
     (A_i a_i) . (A_j a_j) = 0                (1)
 
 a_i and a_j are the arms of the cross: body_i turns against the cross about a_i, body_j about a_j. Between two shafts
-whose axes enclose the angle beta, with the arms across their shafts, the angles of turn obey (Haug 1989, sect. 9.4)
+whose axes enclose the angle beta, with the arms across their shafts, the angles of turn obey
 
-    tan(theta_j) = tan(theta_i) / cos(beta)
+    tan(theta_j) = cos(beta) tan(theta_i)
 
-where theta_i counts from the position in which a_i is across the plane of the shafts.
+both counted from where a_i is across the plane of the shafts, which is the fourth row with a_i and a_j written out.
 """
 
 from __future__ import annotations
