@@ -15,6 +15,7 @@ from dms_core.model import (
     DrumRope,
     Gear,
     Gravity,
+    Harmonic,
     JointTerm,
     LinearCoupling,
     LumpedLoad,
@@ -30,6 +31,7 @@ from dms_core.model import (
     System,
     TurnCounter,
 )
+from dms_core.simulation.dynamics import SolverOptions
 from tests.dms_core.model.constraints.wheels import NEAR, axle, run, torque, turned, wheel
 
 FIRST, SECOND = wheel("first", 0.02), wheel("second", 0.05, 1.0)
@@ -54,6 +56,21 @@ class TestGear:
         assert first[-1] / (2.0 * math.pi) == pytest.approx(8.0, rel=NEAR)
         # The relation holds at every step as a constraint does.
         np.testing.assert_allclose(second, ratio * first, atol=1e-8)
+
+    @pytest.mark.parametrize("method", ["bdf2", "sdirk2"])
+    @pytest.mark.parametrize("ratio", [-11.3, 0.07])
+    def test_a_coarse_run_loses_no_turn(self, ratio, method):
+        """At rtol 1e-2, there and back, by more than a hundred turns of the faster wheel."""
+        inertia = 0.02 + ratio**2 * 0.05
+        swing = Harmonic(amplitude=60.0 * inertia, frequency=0.3)
+        gear = Gear(name="gear", joint_i="first_axle", joint_j="second_axle", ratio=ratio)
+        found = run(
+            5.0, torque=swing, options=SolverOptions(rtol=1e-2, method=method), bodies=[FIRST, SECOND],
+            constraints=[*AXLES, gear], forces=[torque("first_axle")],
+        )  # fmt: skip
+        first = turned(found, "first")
+        assert np.abs(first).max() > 16.0 * 2.0 * math.pi
+        np.testing.assert_allclose(turned(found, "second"), ratio * first, atol=1e-8)
 
     def test_its_multiplier_is_the_moment_that_it_passes_on(self):
         gear = Gear(name="gear", joint_i="first_axle", joint_j="second_axle", ratio=-2.0)
@@ -248,6 +265,22 @@ def test_counter_after_fifty_turns():
     counted = found.q[:, found.model.layout.names.index("turns.angle")]
     assert counted[-1] == pytest.approx(100.0 * math.pi, rel=NEAR)
     np.testing.assert_allclose(counted, turned(found, "spinning"), atol=1e-3)
+
+
+def test_two_ways_are_coupled_without_an_angle():
+    """A hydraulic pair: x1 = 2 x2 under a force on the first, x1 = F t^2 / (2 (m + m / 4))."""
+    blocks = [RigidBody(name=n, mass=2.0, inertia=(0.1, 0.1, 0.1)) for n in ("one", "two")]
+    rails = [Slider(name=f"{b.name}_rail", body_j=b.name, axis_i=(1.0, 0.0, 0.0)) for b in blocks]
+    terms = (
+        JointTerm(joint="one_rail", coordinate="slide", factor=1.0),
+        JointTerm(joint="two_rail", coordinate="slide", factor=-2.0),
+    )
+    pump = LinearCoupling(name="pump", coordinates=terms)
+    push = LumpedLoad(name="push", body="one", force=(5.0, 0.0, 0.0))
+    found = run(1.0, bodies=blocks, constraints=[*rails, pump], forces=[push])
+    one, two = (found.q[-1, found.model.layout.names.index(f"{n}.x")] for n in ("one", "two"))
+    assert one == pytest.approx(1.0, rel=NEAR)
+    assert two == pytest.approx(0.5, rel=NEAR)
 
 
 def test_a_coupling_of_an_angle_with_itself_and_a_way_is_a_screw():

@@ -6,6 +6,7 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.model import Constant, Input, JointMotor, Revolute, RigidBody, System
+from dms_core.model.signals import Signal
 from dms_core.results import Trajectory
 from dms_core.simulation.dynamics import SolverOptions, simulate
 
@@ -32,10 +33,11 @@ def torque(joint: str) -> JointMotor:
     return JointMotor(name="motor", joint=joint, input="torque")
 
 
-def run(time: float, *, torque: float | None = None, **parts) -> Trajectory:
-    """A tight run of a system of these parts."""
-    inputs = [] if torque is None else [Input(name="torque", signal=Constant(value=torque))]
-    return simulate(Model(System("wheels", inputs=inputs, **parts)), time, TIGHT).check()
+def run(time: float, *, torque: float | Signal | None = None, options: SolverOptions = TIGHT, **parts) -> Trajectory:
+    """A run of a system of these parts, a tight one by default."""
+    signal = Constant(value=torque) if isinstance(torque, float) else torque
+    inputs = [] if signal is None else [Input(name="torque", signal=signal)]
+    return simulate(Model(System("wheels", inputs=inputs, **parts)), time, options).check()
 
 
 def turned(found: Trajectory, body: str) -> np.ndarray:
