@@ -2,11 +2,11 @@
 
     l(q) - l(0) - s r (theta - theta(0)) = 0        s = 1 where a growing angle pays rope out, -1 where it takes it up
 
-l is the length of the path from the drum to the rope's end. The path begins where the rope leaves the drum, a point
-that is fixed on the body that carries the drum, at the rim. The multiplier is the tension [N]: it pulls at both ends of
-the path, and turns the drum with the moment tau r. Two ropes on one drum, one paid out as the other is taken up, are a
-rope that runs over the drum without slip. The pull at the path's first point goes to the carrier itself, and is no part
-of the reaction in the drum's bearing.
+l is the length of the path from the drum to the rope's end. The path begins at the rim, where the rope leaves the drum:
+a point that moves with the drum's axis and turns with the body that carries the drum, not with the drum itself. The
+multiplier is the tension tau [N]: it pulls at both ends of the path, at the drum as a force through its axis and the
+moment tau r. Two ropes on one drum, one paid out as the other is taken up, are a rope that runs over the drum without
+slip.
 
 The angle is known but for whole turns, and so is the row but for whole circumferences: the value nearest to 0 is right
 after any number of turns.
@@ -23,7 +23,7 @@ from pydantic import Field
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.constraints.joints.axis_joint import AxisJoint
-from dms_core.model.constraints.primitives import joint_pattern
+from dms_core.model.constraints.joints.relative_pose import joint_arms
 from dms_core.model.element import Constraint, ConstraintPattern, Limit, Placement
 from dms_core.model.geometry.angle import (
     add_angle_gradient,
@@ -37,16 +37,21 @@ from dms_core.model.geometry.path import (
     add_path_gradient,
     add_path_hessian,
     add_path_rate_gradient,
-    moving_path,
     path_pattern,
+    path_table,
     start_length,
 )
 from dms_core.model.geometry.rotations import vec
+from dms_core.model.geometry.span import add_span_gradient, add_span_hessian, add_span_rate_gradient
 from dms_core.model.ropes.pushing import no_push
 
-PATH_INTEGERS, PATH_NUMBERS = 2, 11
-"""Where the path begins: in `ip` behind the offsets of both bodies of the joint, in `par` behind s r, the length at the
-start, and f, g, h of the angle."""
+SPAN_INTEGERS, SPAN_NUMBERS = 3, 11
+"""Where the span from the rim begins: in `ip` behind the offsets of both bodies of the joint and the place of the rest
+of the path, in `par` behind s r, the length at the start, and f, g, h of the angle."""
+PARTS = 3
+"""Most parts of that span: the drum's axis, the carrier's turn, the far end."""
+PATH_NUMBERS = SPAN_NUMBERS + 3 * PARTS
+"""Where the rest of the path begins in `par`."""
 TOLD = 0.1
 """Lever of the rope about the drum's axis, over the radius, from which on it tells the sense of winding."""
 
@@ -54,16 +59,19 @@ TOLD = 0.1
 @compiled
 def drum_rope(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """The equation and its derivatives."""
-    oi, oj, radius, f, g, h = ip[0], ip[1], par[0], vec(par, 2), vec(par, 5), vec(par, 8)
-    error = add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, G[0]) - par[1]
+    oi, oj, rest, radius, f, g, h = ip[0], ip[1], ip[2], par[0], vec(par, 2), vec(par, 5), vec(par, 8)
+    error = add_span_gradient(ip, SPAN_INTEGERS, par, SPAN_NUMBERS, q, 1.0, G[0]) - par[1]
+    error += add_path_gradient(ip, rest, par, PATH_NUMBERS, q, 1.0, G[0])
     error -= radius * joint_angle(oi, oj, f, g, h, q)
-    circumference = 2.0 * math.pi * radius
+    circumference = 2.0 * math.pi * abs(radius)
     phi[0] = error - circumference * math.floor(error / circumference + 0.5)
     add_angle_gradient(0, oi, oj, f, g, h, q, -radius, G)
     if level > 0:
-        add_path_rate_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, v, 1.0, W[0])
+        add_span_rate_gradient(ip, SPAN_INTEGERS, par, SPAN_NUMBERS, q, v, 1.0, W[0])
+        add_path_rate_gradient(ip, rest, par, PATH_NUMBERS, q, v, 1.0, W[0])
         add_angle_rate_gradient(0, oi, oj, f, g, h, q, v, -radius, W)
-        add_path_hessian(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, lam[0], H)
+        add_span_hessian(ip, SPAN_INTEGERS, par, SPAN_NUMBERS, q, lam[0], H)
+        add_path_hessian(ip, rest, par, PATH_NUMBERS, q, lam[0], H)
         add_angle_hessian(oi, oj, f, g, h, q, -radius * lam[0], H)
 
 
@@ -94,23 +102,43 @@ class DrumRope(Constraint):
 
     def place(self, system) -> Placement:
         """Bodies of the path, then those of the joint that are not among them."""
-        who = f"drum_rope '{self.name}'"
         joint = system.element(self.joint, AxisJoint)
         if self.path[0].body != joint.body_i:
             raise ModelError(
-                f"{who}: path begins on '{self.path[0].body}'. Expected a point of '{joint.body_i}', which carries the "
-                f"drum '{joint.body_j}': where the rope leaves the drum does not turn with it."
+                f"drum_rope '{self.name}': path begins on '{self.path[0].body}'. Expected a point of '{joint.body_i}', "
+                f"which carries the drum '{joint.body_j}': where the rope leaves the drum does not turn with it."
             )
-        table = moving_path(system, who, self.path)
-        bodies = tuple(dict.fromkeys((*table.bodies, joint.body_i, joint.body_j)))
+        if all(p.body == joint.body_i for p in self.path):
+            raise ModelError(
+                f"drum_rope '{self.name}': all points of the path are on '{joint.body_i}', which carries the drum, so "
+                "that its length never changes. Let it end on another body."
+            )
+        rest = path_table(system, self.path[1:])
+        bodies = tuple(dict.fromkeys((*rest.bodies, joint.body_i, joint.body_j, self.path[1].body)))
         oi, oj = 7 * bodies.index(joint.body_i), 7 * bodies.index(joint.body_j)
+        parts = self._span(system, joint)
+        span = [len(parts), *(x for body, t, n, _ in parts for x in (7 * bodies.index(body), t, n))]
+        arms = np.ravel([s for *_, s in parts])
         numbers = (self._sense(system, joint) * self.radius, start_length(system, self.path))
         return Placement(
             bodies=bodies,
-            integers=(oi, oj, *table.integers),
-            numbers=(*numbers, *map(float, start_frame(system, joint)), *table.numbers),
-            pattern=_pattern(table, 7 * len(bodies), np.r_[oi : oi + 7, oj : oj + 7]),
-        )
+            integers=(oi, oj, SPAN_INTEGERS + len(span), *span, *rest.integers),
+            numbers=(
+                *numbers, *map(float, start_frame(system, joint)), *map(float, arms), *rest.numbers
+            ),
+            pattern=_pattern(rest, 7 * len(bodies), [7 * bodies.index(body) for body, *_ in parts]),
+        )  # fmt: skip
+
+    def _span(self, system, joint: AxisJoint) -> list[tuple[str, int, int, np.ndarray]]:
+        """Parts of the vector from the rim to the path's second point: body, t, n and s of span.py."""
+        second = self.path[1]
+        axis_j = joint_arms(system, joint)[1]
+        rim = np.asarray(self.path[0].point) - np.asarray(joint.point_i)
+        return [
+            (joint.body_j, 1, -1, axis_j),
+            (joint.body_i, 0, -1, rim),
+            (second.body, 1, 1, system.arm(second.body, second.point)),
+        ]
 
     def _sense(self, system, joint: AxisJoint) -> float:
         """1 where a growing angle pays rope out: where the rim, at the path's first point, moves along the rope.
@@ -139,11 +167,11 @@ class DrumRope(Constraint):
         return 1.0 if (told or self.winding) == "pays_out" else -1.0
 
 
-def _pattern(table, n: int, turning: np.ndarray) -> ConstraintPattern:
-    """The path's bodies by all their coordinates, the joint's by its Euler parameters."""
-    own = joint_pattern("1")
-    row, H = np.zeros((1, n), bool), path_pattern(table, n)
-    row[0, : table.size] = True
-    row[:, turning] |= own.G
-    H[np.ix_(turning, turning)] |= own.H
+def _pattern(rest, n: int, offsets: list[int]) -> ConstraintPattern:
+    """The bodies of the span from the rim, and those of the rest of the path."""
+    row, H = np.zeros((1, n), bool), path_pattern(rest, n)
+    near = np.concatenate([np.arange(o, o + 7) for o in dict.fromkeys(offsets)])
+    row[0, : rest.size] = True
+    row[0, near] = True
+    H[np.ix_(near, near)] = True
     return ConstraintPattern(row, row, H)

@@ -10,11 +10,13 @@ import pytest
 from dms_core.assembly.model import Model
 from dms_core.errors import ModelError
 from dms_core.model import (
+    AngleDriver,
     Cylindrical,
     Gravity,
     JointAngle,
     JointMotor,
     JointReaction,
+    MinimumJerk,
     Planar,
     Revolute,
     RigidBody,
@@ -171,6 +173,19 @@ def test_a_motor_spins_up_a_wheel():
     rotor = wheel("rotor", 0.02)
     found = run(1.0, torque=1.5, bodies=[rotor], constraints=[axle(rotor)], forces=[torque("rotor_axle")])
     assert turned(found, "rotor")[-1] == pytest.approx(37.5, rel=NEAR)
+
+
+def test_a_motor_whose_angle_is_driven_needs_the_moment_of_its_acceleration():
+    """theta = x (10 s^3 - 15 s^4 + 6 s^5) over six turns: M = J thetaddot, which is -lam."""
+    rotor, way, time = wheel("rotor", 0.02), 12.0 * math.pi, 1.5
+    plan = MinimumJerk(times=(0.0, time), values=(0.0, way))
+    driver = AngleDriver(name="driver", joint="rotor_axle", input="torque")
+    found = run(time, torque=plan, bodies=[rotor], constraints=[axle(rotor), driver])
+    s = found.t / time
+    np.testing.assert_allclose(turned(found, "rotor"), way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2), atol=1e-8)
+    moment = 0.02 * way / time**2 * 60.0 * s * (1.0 - 3.0 * s + 2.0 * s**2)
+    row = found.model.layout.row_names.index("driver.angle")
+    np.testing.assert_allclose(-found.lam[:, row], moment, atol=1e-3 * np.abs(moment).max())
 
 
 def test_one_body_named_twice():
