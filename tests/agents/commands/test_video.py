@@ -9,8 +9,8 @@ pytest.importorskip("pygame")
 import imageio.v3 as imageio
 
 from agents.__main__ import main
-from agents.commands import video as filmed
-from agents.commands.video import BAND, Stage, band, grey, pictures
+from agents.commands.pictures import video as filmed
+from agents.commands.pictures.video import BAND, Stage, band, grey, pictures
 from exo_env.rendering.history import HEIGHT
 
 SIZE = 480

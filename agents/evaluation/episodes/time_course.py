@@ -1,0 +1,106 @@
+"""One episode over time: what a policy did with a patient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dms_core.renamed import replaced
+from exo_env.ecosystem.sensors import tension_sensor
+from exo_env.patient.population import Source, population
+
+from ...environment import ENVIRONMENT
+from ...policies.policy import Policy
+from .episode import movement_of, world_of
+from .fair_play import begin, shown
+from .measures import Record, measured
+
+READ = (
+    "time", "elbow_angle.angle", "reference", "agonist_tension", "antagonist_tension", "muscle_moment", "exo_moment",
+    "effort", "load",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TimeCourse:
+    """Readings of an episode at control times, without noise."""
+
+    policy: str
+    """Title."""
+    patient: dict[str, Any]
+    load: float | None
+    """[kg], None where there is none."""
+    columns: dict[str, np.ndarray]
+    """Shape (n,) each, by those names of READ that the environment has."""
+    event: str | None
+    """What ended the episode early."""
+    measures: dict[str, float]
+    """As of an evaluation (measures.py)."""
+    hidden: bool = False
+    """Whether the device is not told what the patient wants."""
+
+    @property
+    def wanted(self) -> str:
+        """What the reference is for the device."""
+        return "plan" if self.hidden else "reference"
+
+    @property
+    def load_steps(self) -> list[tuple[float, float]]:
+        """Times at which the load changes [s], and by how much [kg]."""
+        if "load" not in self.columns:
+            return []
+        changes = np.diff(self.columns["load"])
+        return [(float(self.columns["time"][k + 1]), float(changes[k])) for k in np.flatnonzero(changes)]
+
+    @property
+    def who(self) -> str:
+        """The patient in words."""
+        shares = [
+            f"{100.0 * self.patient[f'maximum_activation_{muscles}']:.0f} % of the {muscles}"
+            for muscles in ("flexors", "extensors")
+            if f"maximum_activation_{muscles}" in self.patient
+        ]
+        load = [] if self.load is None else [f"{self.load:.1f} kg"]
+        return "; ".join(([f"commands {', '.join(shares)}"] if shares else []) + load)
+
+
+def time_course(
+    policy: Policy,
+    patient: Source,
+    seed: int,
+    options: dict[str, Any] | None = None,
+    environment: str = ENVIRONMENT,
+    **settings: Any,
+) -> TimeCourse:
+    """Run an episode.
+
+    Args:
+        policy: that assists.
+        patient: population to draw from.
+        seed: of the episode.
+        options: of the environment's reset.
+        environment: its id.
+        settings: further ones of the environment.
+    """
+    env = world_of(policy, population(patient).model_dump(), environment, **settings)
+    world: Any = env.unwrapped
+    observation, drawn = env.reset(seed=seed, options=options)
+    begin(policy, env)
+    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
+    info, rows, over = drawn, [world.readings()], False
+    record.add(rows[0])
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(policy(observation, shown(info, env)))
+        rows.append(world.readings())
+        record.add_step(float(reward), info)
+        record.add(rows[-1])
+        over = terminated or truncated
+    env.close()
+    columns = {name: np.array([row[name] for row in rows]) for name in READ if name in rows[0]}
+    about = drawn.get("patient", {}), drawn.get("load")
+    return TimeCourse(policy.title, *about, columns, info.get("event"), measured(record), bool(world.task.revealing))
+
+
+__getattr__ = replaced(__name__, {"Course": "It is now TimeCourse.", "course": "It is now time_course."})
