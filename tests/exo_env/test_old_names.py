@@ -52,18 +52,19 @@ def test_what_a_users_project_wrote_in_version_0_1():
         from exo_env.human import MUSCLES  # noqa: F401
 
 
-@pytest.mark.filterwarnings("ignore:'exo_env.human:FutureWarning")
+@pytest.mark.filterwarnings("ignore::FutureWarning")
 def test_what_a_users_project_wrote_in_version_0_3():
-    with pytest.warns(FutureWarning):
-        from exo_env.tasks.movement import Movement
-        from exo_env.world.episode import Episode
+    from exo_env.tasks.movement import Movement
+    from exo_env.world.episode import Episode
 
-        from exo_env.tasks import rewards
+    from exo_env.tasks import rewards
+
     assert rewards.Weights is import_module("exo_env.tasks.judgement.rewards").Weights
     assert Movement is import_module("exo_env.tasks.movements.movement").Movement
     assert Episode is import_module("exo_env.world.episodes.episode").Episode
 
 
+@pytest.mark.filterwarnings("ignore:'exo_env.human:FutureWarning")
 def test_a_star_gives_the_names_that_have_moved():
     found = {}
     with pytest.warns(FutureWarning, match="'exo_env.human.Person' is now 'exo_env.ecosystem.person.Person'"):
