@@ -24,7 +24,7 @@ from exo_env.rendering.scene import Scene
 
 from ...environment import ENVIRONMENT, environment_id
 from ...evaluation.episodes.episode import world_of
-from ...evaluation.episodes.fair_play import begin, shown
+from ...evaluation.episodes.playing import Playing
 from ...policies.learned import shipped_policies
 from ...policies.policy import Policy
 from ..options import device_settings, different_policies, repeated
@@ -114,8 +114,7 @@ class Stage:
     ) -> None:
         self.policy = policy
         self.env = world_of(policy, population(patient).model_dump(), environment, render_mode="rgb_array", **settings)
-        self.observation, self.info = self.env.reset(seed=seed)
-        begin(policy, self.env)
+        self.playing = Playing(self.env, policy, seed)
         world: Any = self.env.unwrapped
         self.rate, self.length = round(1.0 / world.period), round(world.duration / world.period) + 1
         self.scenes: list[Scene] = [world.scene()]
@@ -124,13 +123,8 @@ class Stage:
     def run(self) -> None:
         """The whole episode; the environment is then closed."""
         world: Any = self.env.unwrapped
-        over = False
-        while not over:
-            action = self.policy(self.observation, shown(self.info, self.env))
-            self.observation, _, terminated, truncated, self.info = self.env.step(action)
-            self.scenes.append(world.scene())
-            over = terminated or truncated
-        event = self.info.get("event")
+        self.scenes += [world.scene() for _ in self.playing.steps()]
+        event = self.playing.event
         self.event = "" if event is None else f"ended at {self.scenes[-1].time:.2f} s: {event}"
         self.env.close()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -14,8 +14,9 @@ from exo_env.tasks.movements.repetition import MOVED, Repetition, Repetitions
 from ...environment import ENVIRONMENT, make, task_type
 from ...policies.learned import LearnedPolicy
 from ...policies.policy import Policy
-from .fair_play import begin, check_fair, shown
+from .fair_play import check_fair
 from .measures import Record, left_out, measured
+from .playing import Playing
 
 ABOUT = ("load", "ability", "reference", "patient")
 """What is kept of the `info` of a reset, where it is in there."""
@@ -55,35 +56,42 @@ def episode(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = 
         "measures", "event", which ended it or None, what `info` of the reset says of patient, load and movement, and
         "left_out", the measures that the environment does not allow.
     """
-    drawn, record = recorded(env, acting, seed, load)
+    playing = Playing(env, acting, seed, reset_options(load))
+    record = recorded(playing)
     return {
-        **{k: drawn[k] for k in ABOUT if k in drawn},
+        **{k: playing.drawn[k] for k in ABOUT if k in playing.drawn},
         "event": record.event,
         "measures": measured(record),
         "left_out": left_out(record),
     }
 
 
-def recorded(env: gymnasium.Env, acting: Policy, seed: int, load: float | None = None) -> tuple[dict[str, Any], Record]:
-    """Run one episode; arguments as of `episode`.
+def reset_options(load: float | None) -> dict[str, Any] | None:
+    """Options of a reset with a load [kg]; None: that which the seed draws."""
+    return None if load is None else {"load": load}
 
-    Returns:
-        `info` of the reset, and the episode's record.
+
+def recorded(playing: Playing, watch: Callable[[Mapping[str, float]], None] = lambda readings: None) -> Record:
+    """Play an episode to its end.
+
+    Args:
+        playing: the episode at its start.
+        watch: is given all readings of each control time.
     """
-    world: Any = env.unwrapped
-    observation, drawn = env.reset(seed=seed, options=None if load is None else {"load": load})
-    info = drawn
-    begin(acting, env)
-    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
-    record.add(world.readings())
-    over = False
-    while not over:
-        observation, reward, terminated, truncated, info = env.step(acting(observation, shown(info, env)))
-        record.add_step(float(reward), info)
-        record.add(world.readings())
-        over = terminated or truncated
-    record.event = info.get("event")
-    return drawn, record
+    world: Any = playing.env.unwrapped
+    ropes = tuple(map(tension_sensor, world.ecosystem.device.ropes))
+    record = Record(movement_of(playing.env, playing.drawn), ropes, world.period)
+
+    def add(readings: Mapping[str, float]) -> None:
+        record.add(readings)
+        watch(readings)
+
+    add(world.readings())
+    for reward, info in playing.steps():
+        record.add_step(reward, info)
+        add(world.readings())
+    record.event = playing.event
+    return record
 
 
 def judged(env: gymnasium.Env, acting: Policy, seeds: Sequence[int]) -> list[dict[str, Any]]:

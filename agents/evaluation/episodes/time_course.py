@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dms_core.renamed import replaced
-from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.patient.population import Source, population
 
 from ...environment import ENVIRONMENT
 from ...policies.policy import Policy
-from .episode import movement_of, world_of
-from .fair_play import begin, shown
-from .measures import Record, measured
+from .episode import recorded, world_of
+from .fair_play import hidden_by
+from .measures import measured
+from .playing import Playing
 
 READ = (
     "time", "elbow_angle.angle", "reference", "agonist_tension", "antagonist_tension", "muscle_moment", "exo_moment",
@@ -85,22 +86,12 @@ def time_course(
         settings: further ones of the environment.
     """
     env = world_of(policy, population(patient).model_dump(), environment, **settings)
-    world: Any = env.unwrapped
-    observation, drawn = env.reset(seed=seed, options=options)
-    begin(policy, env)
-    record = Record(movement_of(env, drawn), tuple(map(tension_sensor, world.ecosystem.device.ropes)), world.period)
-    info, rows, over = drawn, [world.readings()], False
-    record.add(rows[0])
-    while not over:
-        observation, reward, terminated, truncated, info = env.step(policy(observation, shown(info, env)))
-        rows.append(world.readings())
-        record.add_step(float(reward), info)
-        record.add(rows[-1])
-        over = terminated or truncated
+    playing, rows = Playing(env, policy, seed, options), list[Mapping[str, float]]()
+    record = recorded(playing, rows.append)
     env.close()
     columns = {name: np.array([row[name] for row in rows]) for name in READ if name in rows[0]}
-    about = drawn.get("patient", {}), drawn.get("load")
-    return TimeCourse(policy.title, *about, columns, info.get("event"), measured(record), bool(world.task.revealing))
+    about = playing.drawn.get("patient", {}), playing.drawn.get("load")
+    return TimeCourse(policy.title, *about, columns, record.event, measured(record), bool(hidden_by(env)))
 
 
 __getattr__ = replaced(__name__, {"Course": "It is now TimeCourse.", "course": "It is now time_course."})

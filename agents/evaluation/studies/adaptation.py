@@ -34,7 +34,8 @@ from ...policies.batch_policy import BatchPolicy
 from ...policies.policy import Policy
 from ..comparison.evaluate import Case, Plan
 from ..comparison.statistics import CONFIDENCE, RESAMPLES, Estimate, estimate, mean
-from ..episodes.episode import recorded, world_of
+from ..episodes.episode import reset_options, world_of
+from ..episodes.playing import Playing
 from ..search.batch_trials import batch_steps
 from ..search.hindsight import tried_numbers
 from ..search.tuning import tunable
@@ -87,9 +88,9 @@ def window_returns(one: Policy, plan: Plan, cases: Sequence[Case]) -> list[dict[
             found.append({"seed": seed, "windows": returns, "unsafe": bool(ended[:, k].any())})
     else:
         for seed, load in cases:
-            _, record = recorded(env, one, seed, load)
-            returns = parts(record.rewards, windows, steps)
-            found.append({"seed": seed, "windows": returns, "unsafe": record.event is not None})
+            playing = Playing(env, one, seed, reset_options(load))
+            returns = parts([reward for reward, _ in playing.steps()], windows, steps)
+            found.append({"seed": seed, "windows": returns, "unsafe": playing.event is not None})
     env.close()
     return found
 
