@@ -5,15 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import shlex
-import sys
 from collections.abc import Mapping, Sequence
 from typing import Annotated
 
-from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
-from dms_core.errors import Stopped, counted, printable
+from dms_core.errors import counted, printable
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs
 
@@ -22,7 +20,8 @@ from ...evaluation.search.hindsight import hindsight as tried
 from ...evaluation.search.hindsight import summed_up, tuned_difference
 from ...evaluation.search.tries import KeptTries, Try, beside
 from ...evaluation.search.tuning import tunable
-from ..options import check_hides_plan, sharing_out
+from ..options import check_hides_plan
+from .kept_search import kept_search
 
 USUAL = "exo/HiddenIntent-v0"
 CLOCK, ANGLE = "mean_clock", "mean_angle"
@@ -61,30 +60,12 @@ def hindsight(
     done: dict[str, list[Try]] = {}
     with Outputs("hindsight", files=[OutputFile("--out", out)], inputs=[population], overwrite=overwrite) as outputs:
         kept, names = KeptTries(beside(out), command), tunable(environment)
-        total = len(names) * tries
-        try:
-            with (
-                sharing_out(workers, address) as share_out,
-                tqdm(
-                    total=total, initial=kept.count, unit="try", leave=False, disable=None, file=sys.stderr
-                ) as bar,
-            ):  # fmt: skip
-
-                def progress(one: Try) -> None:
-                    kept.add(one)
-                    bar.set_description(one.policy)
-                    bar.update()
-
-                for name in names:
-                    done[name] = tried(
-                        name, tries, patients, seed, population=population, environment=environment,
-                        share_out=share_out, known=list(kept.done.get(name, ())), progress=progress,
-                    )  # fmt: skip
-        except KeyboardInterrupt:
-            if not kept.count:
-                raise
-            said = f"{kept.count} of {total} tries are in '{kept.path}'; the same command goes on from there."
-            raise Stopped(said) from None
+        with kept_search(kept, len(names) * tries, workers, address) as (share_out, progress):
+            for name in names:
+                done[name] = tried(
+                    name, tries, patients, seed, population=population, environment=environment,
+                    share_out=share_out, known=list(kept.done.get(name, ())), progress=progress,
+                )  # fmt: skip
         write_text(out, _table(done, command))
         kept.remove()
     print(f"{counted(patients, 'patient')} of '{population}', {tries} tries each; mean return [95 % interval]")

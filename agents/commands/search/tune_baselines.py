@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from collections.abc import Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
-from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
-from dms_core.errors import Stopped, printable
+from dms_core.errors import printable
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs
 
@@ -21,7 +19,8 @@ from ...evaluation.comparison.opponents import RETURNS
 from ...evaluation.search.tries import KeptTries, Try, beside, table
 from ...evaluation.search.tuning import POPULATION, tunable, tune, untuned
 from ...policies.tuned import FILE, HIDDEN_INTENT
-from ..options import device_settings, sharing_out
+from ..options import device_settings
+from .kept_search import kept_search
 
 
 def tune_baselines(
@@ -54,40 +53,19 @@ def tune_baselines(
         exoskeleton: device by name or YAML file, or changes of the default one as JSON.
         overwrite: replace files of these names.
     """
-    hidden = hides_plan(environment)
-    found = configs() / (HIDDEN_INTENT if hidden else FILE)
+    found = configs() / (HIDDEN_INTENT if hides_plan(environment) else FILE)
     best = (found.parent if out is None else out) / found.name
     every = best.with_name(f"{best.stem}_tries.csv")
-    settings = device_settings(exoskeleton)
+    common = {"population": population, "environment": environment, "repetitions": repetitions}
+    common |= device_settings(exoskeleton)
     command = f"{PROGRAM} tune-baselines --tries {tries} --patients {patients} --seed {seed}"
     command += _further(population, repetitions, environment, exoskeleton)
-    head = f"{command}; means over the patients"
-    files, best_first = [OutputFile("--out", best), OutputFile("--out", every)], dict[str, list[Try]]()
+    files = [OutputFile("--out", best), OutputFile("--out", every)]
     with Outputs("tune-baselines", files=files, inputs=[population, exoskeleton], overwrite=overwrite) as outputs:
-        kept, names = KeptTries(beside(every), head), tunable(environment)
-        total = len(names) * tries
-        common = {"population": population, "environment": environment, "repetitions": repetitions, **settings}
-        try:
-            with sharing_out(workers, address) as share_out, _bar(total, kept.count) as bar:
-
-                def progress(one: Try) -> None:
-                    kept.add(one)
-                    bar.set_description(one.policy)
-                    bar.update()
-
-                for name in names:
-                    known = list(kept.done.get(name, ()))
-                    best_first[name] = tune(
-                        name, tries, patients, seed, share_out=share_out, known=known, progress=progress, **common
-                    )
-                others = untuned(patients, seed, **common) if hidden else {}
-        except KeyboardInterrupt:
-            if not kept.count:
-                raise
-            said = f"{kept.count} of {total} tries are in '{kept.path}'; the same command goes on from there."
-            raise Stopped(said) from None
+        kept = KeptTries(beside(every), f"{command}; means over the patients")
+        best_first, others = _searched(kept, tries, patients, seed, workers, address, common)
         write_text(best, _yaml(best_first, others, population, command, every.name))
-        write_text(every, table(best_first, head))
+        write_text(every, table(best_first, kept.command))
         kept.remove()
     for name, ranked in best_first.items():
         print(f"{name:20} return {ranked[0].measures['return']:.1f}  {ranked[0].numbers}")
@@ -97,17 +75,26 @@ def tune_baselines(
     return FAILED_RUN if outputs.failed else 0
 
 
+def _searched(
+    kept: KeptTries, tries: int, patients: int, seed: int, workers: int, address: str | None, common: dict[str, Any]
+) -> tuple[dict[str, list[Try]], dict[str, float]]:
+    """Tries of each policy, best first; where the plan is hidden, mean returns of who has nothing to tune, too."""
+    names, best_first = tunable(common["environment"]), dict[str, list[Try]]()
+    with kept_search(kept, len(names) * tries, workers, address) as (share_out, progress):
+        for name in names:
+            known = list(kept.done.get(name, ()))
+            best_first[name] = tune(
+                name, tries, patients, seed, share_out=share_out, known=known, progress=progress, **common
+            )
+        return best_first, untuned(patients, seed, **common) if hides_plan(common["environment"]) else {}
+
+
 def _further(population: str, repetitions: int, environment: str, exoskeleton: str | None) -> str:
     """Options that are not the usual ones, as they are typed."""
     options = f" --population {shlex.quote(population)}" if population != POPULATION else ""
     options += f" --repetitions {repetitions}" if repetitions > 1 else ""
     options += f" --env {environment}" if environment != ENVIRONMENT else ""
     return options + (f" --exoskeleton {shlex.quote(exoskeleton)}" if exoskeleton else "")
-
-
-def _bar(total: int, done: int) -> tqdm:
-    """A bar with the time that is left, where somebody looks."""
-    return tqdm(total=total, initial=done, unit="try", leave=False, disable=None, file=sys.stderr)
 
 
 def _yaml(

@@ -22,6 +22,7 @@ from ..comparison.evaluate import check_numbers
 from ..comparison.statistics import estimate, mean
 from ..sharing.shares import ShareOut
 from .batch_trials import batch_returns
+from .shared_tries import SharedTries
 from .tries import Try
 from .tuning import around, first_places, numbers_at, share_sizes
 
@@ -94,15 +95,10 @@ def hindsight(
     if tries < 2:
         raise InputError(f"tries = {tries}: expected a whole number from 2.")
     rows, seeds = tried_numbers(policy, tries, seed), patient_seeds(seed, patients)
-    finished = {tuple(one.numbers.values()): one for one in known}
-    left = [row for row in rows if tuple(row.values()) not in finished]
-    size = share_sizes(policy, patients)
-    shares = [(policy, left[k : k + size], seeds, population, environment, settings) for k in range(0, len(left), size)]
-    for found in share_out(patient_returns, shares):
-        for one in found:
-            finished[tuple(one.numbers.values())] = one
-            progress(one)
-    return [finished[tuple(row.values())] for row in rows]
+    given = seeds, population, environment, settings
+    shared = SharedTries(patient_returns, policy, given, share_sizes(policy, patients), share_out, progress)
+    shared.know(known)
+    return shared.at(rows)
 
 
 def summed_up(tries: Mapping[str, Sequence[Try]], seed: int) -> list[dict[str, Any]]:

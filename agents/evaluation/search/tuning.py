@@ -25,6 +25,7 @@ from ...policies.tuned import Range
 from ..episodes.episode import judged, world_of
 from ..sharing.shares import ShareOut, processes
 from .batch_trials import batch_returns
+from .shared_tries import SharedTries
 from .tries import Try
 
 POPULATION, STREAM = "mixed", 2**32
@@ -92,7 +93,7 @@ def tune(
     workers: int = 1,
     share_out: ShareOut | None = None,
     known: Iterable[Try] = (),
-    progress: Callable[[Try], None] | None = None,
+    progress: Callable[[Try], None] = lambda one: None,
     **settings: Any,
 ) -> list[Try]:
     """Tries of a policy, best first.
@@ -113,42 +114,33 @@ def tune(
     Raises:
         InputError: the policy has nothing to tune, or a number is not usable.
     """
+    _check(policy, environment, tries=(tries, 2), patients=(patients, 1), seed=(seed, 0), workers=(workers, 1))
+    given = population, patient_seeds(STREAM + seed, patients), settings, environment
+    with processes(workers) if share_out is None else nullcontext(share_out) as each:
+        shared = SharedTries(trials, policy, given, share_sizes(policy, patients), each, progress)
+        shared.know(known)
+        return _best_first(shared, tries, np.random.default_rng(seed))
+
+
+def _check(policy: str, environment: str, **numbers: tuple[int, int]) -> None:
+    """Refuse what cannot be searched; numbers each with the least that it may be."""
     if policy not in tunable(environment):
         raise InputError(f"policy '{policy}' has nothing to tune; there are {', '.join(tunable(environment))}.")
-    for name, value, least in (
-        ("tries", tries, 2),
-        ("patients", patients, 1),
-        ("seed", seed, 0),
-        ("workers", workers, 1),
-    ):
+    for name, (value, least) in numbers.items():
         if not isinstance(value, int) or value < least:
             raise InputError(f"{name} = {value!r}: expected a whole number from {least}.")
-    ranges, seeds = POLICIES[policy].ranges, patient_seeds(STREAM + seed, patients)
-    generator = np.random.default_rng(seed)
-    done: list[tuple[np.ndarray, Try]] = []
-    finished = {tuple(one.numbers.values()): one for one in known}
 
-    def run(places: np.ndarray, each: ShareOut) -> None:
-        """Try these places, each from 0 to 1 in every range."""
-        rows = [numbers_at(ranges, place) for place in places]
-        left = [row for row in rows if tuple(row.values()) not in finished]
-        size = share_sizes(policy, patients)
-        shares = [
-            (policy, left[k : k + size], population, seeds, settings, environment) for k in range(0, len(left), size)
-        ]
-        for found in each(trials, shares):
-            for one in found:
-                finished[tuple(one.numbers.values())] = one
-                if progress is not None:
-                    progress(one)
-        done.extend((place, finished[tuple(row.values())]) for place, row in zip(places, rows, strict=True))
 
-    with processes(workers) if share_out is None else nullcontext(share_out) as each:
-        run(first_places(len(ranges), tries // 2, generator), each)
-        while len(done) < tries:
-            best = max(done, key=_return)[0]
-            run(around(best, min(BATCH, tries - len(done)), generator), each)
-    return [one for _, one in sorted(done, key=_return, reverse=True)]
+def _best_first(shared: SharedTries, tries: int, generator: np.random.Generator) -> list[Try]:
+    """The search itself: spread over the ranges, then around the best one so far."""
+    ranges = POLICIES[shared.policy].ranges
+    places, done = first_places(len(ranges), tries // 2, generator), list[tuple[np.ndarray, Try]]()
+    while True:
+        done += zip(places, shared.at([numbers_at(ranges, place) for place in places]), strict=True)
+        if len(done) >= tries:
+            return [one for _, one in sorted(done, key=_return, reverse=True)]
+        best = max(done, key=_return)[0]
+        places = around(best, min(BATCH, tries - len(done)), generator)
 
 
 def untuned(patients: int, seed: int, *, population: str, environment: str, **settings: Any) -> dict[str, float]:
