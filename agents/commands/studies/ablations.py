@@ -71,12 +71,8 @@ def ablations(
     trained = {name: [find_policy(str(folder_of(runs, name, k))) for k in seeds] for name in names}
     everyone = with_opponents([one for ones in trained.values() for one in ones], environment)
     plan = Plan(population, patients, seed, loads, environment)
-    command = (
-        f"{PROGRAM} ablations --variations {shlex.quote(str(variations))} --runs {shlex.quote(str(runs))} --seeds "
-    )
-    command += f"{' '.join(map(str, seeds))} --population {shlex.quote(population)} --patients {patients} --seed {seed}"
-    command += f" --loads {' '.join(f'{x:g}' for x in loads)}" if loads else ""
-    command += f" --env {environment}" if environment != USUAL else ""
+    command = f"{PROGRAM} ablations --variations {shlex.quote(str(variations))} --runs {shlex.quote(str(runs))} "
+    command += f"--seeds {' '.join(map(str, seeds))} {_options(plan, population)}"
     with Outputs("ablations", folder=out, inputs=[population, variations, runs], overwrite=overwrite) as outputs:
         done = run_cells(measured_episodes, [(one, plan) for one in everyone], out, workers, address)
         episodes = {one.name: those for one, those in zip(everyone, done, strict=True)}
@@ -86,6 +82,13 @@ def ablations(
         forget(out)
     print(f"written: {outputs.where(out)} (ablations.csv, ablations.md)")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _options(plan: Plan, population: str) -> str:
+    """Options that say what is evaluated, as they are typed."""
+    options = f"--population {shlex.quote(population)} --patients {plan.patients} --seed {plan.seed}"
+    options += f" --loads {' '.join(f'{x:g}' for x in plan.loads)}" if plan.loads else ""
+    return options + (f" --env {plan.environment}" if plan.environment != USUAL else "")
 
 
 def _rows(

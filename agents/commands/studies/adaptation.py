@@ -83,11 +83,18 @@ def adaptation(
         whom = f"{counted(patients, 'patient')} of '{plan.title}'"
         draw_panels(out / "adaptation.png", _panels(found, used), whom)
         forget(out)
-    for name, one in found.items():
-        print(f"{name:20} windows to nine tenths of the last return: {cell(one.return_windows)}, return of "
-              f"the last: {cell(one.returns[-1])}, its regret: {cell(one.regrets[-1])}")  # fmt: skip
+    print("\n".join(_lines(found)))
     print(f"written: {outputs.where(out)} (adaptation.csv, adaptation.md, adaptation.png)")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _lines(found: Mapping[str, Adaptation]) -> list[str]:
+    """What is printed: a line a policy."""
+    return [
+        f"{name:20} windows to nine tenths of the last return: {cell(one.return_windows)}, return of "
+        f"the last: {cell(one.returns[-1])}, its regret: {cell(one.regrets[-1])}"
+        for name, one in found.items()
+    ]
 
 
 def _numbers(found: Mapping[str, Adaptation], patients: int, command: str) -> str:

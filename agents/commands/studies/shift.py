@@ -64,17 +64,12 @@ def shift(
         environment: in which, by id; one whose task hides the patient's plan.
         overwrite: replace files in the folder that others wrote or changed.
     """
-    if not policy_names:
-        raise InputError("--policy: expected one or more names.")
-    for name in shifts:
-        if name not in SHIFTS or shifts.count(name) > 1:
-            raise InputError(f"--shifts {name}: expected different ones of {choices(SHIFTS)}.")
+    _check(policy_names, shifts)
     check_hides_plan(environment, USUAL)
     require_matplotlib()
-    chosen = shifts or tuple(SHIFTS)
     used = with_opponents(different_policies(policy_names, environment), environment)
     plan = Plan(population, patients, seed, (), environment)
-    keys = [(name, size, one) for name in chosen for size in SHIFTS[name].sizes for one in used]
+    keys = [(name, size, one) for name in shifts or SHIFTS for size in SHIFTS[name].sizes for one in used]
     planned: list[Cell] = [(one, SHIFTS[name].plan(plan, one, size)) for name, size, one in keys]
     inputs: list[str | Path] = [population, *(Path(name) for name in policy_names if name not in shipped_policies())]
     command = f"{PROGRAM} shift --policy {shlex.join(policy_names)} --population {shlex.quote(population)}"
@@ -85,12 +80,20 @@ def shift(
         rows = _rows(keys, episodes, plan)
         write_text(out / "shift.csv", _numbers(rows, patients, command))
         write_text(out / "shift.md", _text(rows, plan, command))
-        draw_panels(
-            out / "shift.png", _panels(rows, used), f"{counted(patients, 'patient')} of '{plan.title}'", [FAULTS]
-        )
+        whom = f"{counted(patients, 'patient')} of '{plan.title}'"
+        draw_panels(out / "shift.png", _panels(rows, used), whom, [FAULTS])
         forget(out)
     print(f"written: {outputs.where(out)} (shift.csv, shift.md, shift.png)")
     return FAILED_RUN if outputs.failed else 0
+
+
+def _check(policy_names: Sequence[str], shifts: Sequence[str]) -> None:
+    """Refuse a run of no policy, and names that are no shifts or stand there twice."""
+    if not policy_names:
+        raise InputError("--policy: expected one or more names.")
+    for name in shifts:
+        if name not in SHIFTS or shifts.count(name) > 1:
+            raise InputError(f"--shifts {name}: expected different ones of {choices(SHIFTS)}.")
 
 
 def _rows(

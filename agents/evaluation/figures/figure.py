@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import COLOURS, drawn, literal, note, panels, save
+from exo_env.rendering.panels import COLOURS, drawn, literal, log_scale, note, panels, save
 from exo_env.rendering.quantities import quantity
 
 from ..episodes.measures import MEASURES, Measure
@@ -36,8 +36,7 @@ def draw(path: Path, results: dict[str, Any]) -> None:
         ax.grid(False, axis="y")
         if m.unit == "deg":
             # An arm without help is off by a hundred times the error of a good device.
-            ax.set_xscale("log")
-            ax.xaxis.set_major_formatter("{x:g}")
+            log_scale(ax, "x")
     for ax in list(axes.flat)[len(shown) :]:
         ax.set_visible(False)
     if equal:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import counted
-from exo_env.rendering.panels import COLOURS, drawn, legend, literal, panels, save
+from exo_env.rendering.panels import COLOURS, drawn, legend, literal, log_scale, panels, save
 
 CURVES = (
     ("return", "return of an episode"),
@@ -91,9 +91,7 @@ def pareto(path: Path, results: Mapping[str, Any]) -> None:
     ax = axes.flat[0]
     _points(ax, policies, policies, "summary")
     _front(ax, policies)
-    ax.set_yscale("log")
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_formatter("{x:g}" if max(errors) < 10.0 * min(errors) else "")
+    log_scale(ax, "y")
     ax.grid(True, which="minor", axis="y", color="0.94", linewidth=0.4)
     ax.set_xlabel("share of the device in the positive work [-]")
     ax.set_ylabel("tracking error, rms [deg]")
