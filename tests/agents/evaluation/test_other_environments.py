@@ -113,7 +113,7 @@ def test_films_and_tuning_take_an_environment_and_a_device():
 
     pytest.importorskip("pygame")
     stage = Stage(policy("pid"), "stroke_mild", 0, "tests/Light-v2", exoskeleton={"hinge_damping": 0.5})
-    assert stage.info["load"] == 0.6
+    assert stage.playing.drawn["load"] == 0.6
     stage.env.close()
     settings = {"episode_duration": 0.2, "exoskeleton": {"hinge_damping": 0.5}}
     tried = tune("pid_yielding", 2, 1, 0, environment=BLIND, **settings)
