@@ -53,10 +53,11 @@ class World(Inspection):
         self.options = options or SolverOptions()
         self._numbers = self.options.numbers()
         self._tables: Packed = self.model.tables
-        start = self.model.start
+        start, radau = self.model.start, self.options.method == "radau5"
         self._world = new_state(
-            self._tables.values, self.model.new_work(), self.model.new_signals(), part_addresses(), start.q, start.v
-        )
+            self._tables.values, self.model.new_work(), self.model.new_signals(), part_addresses(radau),
+            start.q, start.v, radau,
+        )  # fmt: skip
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
@@ -300,7 +301,8 @@ class Simulation(World):
                 raise KeyboardInterrupt
             raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
-        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message)
+        record, high_order = np.concatenate(self._rows), self.options.method == "radau5"
+        return Trajectory(self.model, signals, record, self.result, self.stats(), self.message, high_order)
 
 
 def simulate(

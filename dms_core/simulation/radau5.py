@@ -1,0 +1,122 @@
+"""One step of Radau IIA of order 5 in the stabilised form, its local error and the size of the next step.
+
+The method is that of Hairer and Wanner (1996, IV.8; for index 2, VII.4): positions, velocities and element states are
+of order 5 at the ends of steps, multipliers of order 3 (a record gets those that belong to q and v, of order 5). The
+error estimate is that of an embedded formula of order 3, put through the matrix of the step,
+
+    err = -A(c0)^-1 R(t_n, y_n, ydot = -(e_1 Z_1 + e_2 Z_2 + e_3 Z_3) / h),
+
+so that whatever a multiplier can take up is no error; multipliers themselves are not part of it.
+"""
+
+from dms_core.assembly.tables import MODEL, WORK
+from dms_core.compiled.arena import flags, floats, inner, ints, matrix, naturals
+from dms_core.compiled.jit import compiled
+from dms_core.simulation.newton import NEWTON
+from dms_core.simulation.parts import PARTS, run_part, set_inputs
+from dms_core.simulation.radau_constants import ERROR, ORDER_OF_ERROR, REAL
+from dms_core.simulation.radau_newton import MAX_ITERATIONS, close_constraints, solve_stages
+from dms_core.simulation.radau_stages import remember_stages, take_last_stage
+from dms_core.simulation.radau_state import CONTROL, RADAU
+from dms_core.simulation.state import CLOCK, COUNTS, STATE
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 8.0
+DEAD_ZONE = 1.2
+LEAST_ERROR = 1e-2
+"""Error that a step is taken to have made at least when the next one is predicted."""
+
+
+@compiled
+def _embedded(stage, start, k, h):
+    """Rate of coordinate k in the embedded formula."""
+    y = start[k]
+    return -(ERROR[0] * (stage[0, k] - y) + ERROR[1] * (stage[1, k] - y) + ERROR[2] * (stage[2, k] - y)) / h
+
+
+@compiled
+def _put_begin(s, h, shifted):
+    """Begin of the step into the iterate, `shifted` by the estimated error in x, with the rates of that formula."""
+    w, radau = inner(s, STATE.w), inner(s, STATE.radau)
+    q, v, a, lam, mu = (
+        floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam), floats(w, WORK.mu),
+    )  # fmt: skip
+    q_n, v_n, lam_n = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.lam)
+    stage_v, error_q, error_v = matrix(radau, RADAU.v), floats(s, STATE.q_guess), floats(s, STATE.v_guess)
+    for k in range(q_n.shape[0]):
+        q[k], v[k] = q_n[k], v_n[k]
+        if shifted:
+            q[k] += error_q[k]
+            v[k] += error_v[k]
+        a[k] = _embedded(stage_v, v_n, k, h)
+    for k in range(lam_n.shape[0]):
+        lam[k], mu[k] = lam_n[k], 0.0
+
+
+@compiled
+def _error(m, s, h, shifted):
+    """The estimate into q_guess and v_guess; gives its largest weighted component."""
+    w, b, x, c0 = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), REAL / h
+    free, second = naturals(m, MODEL.free), flags(m, MODEL.second)
+    v, gmu, r2 = floats(w, WORK.v), floats(w, WORK.gmu), floats(w, WORK.r2)
+    stage_q, q_n = matrix(inner(s, STATE.radau), RADAU.q), floats(s, STATE.q)
+    wq, wv = floats(s, STATE.wq), floats(s, STATE.wv)
+    error_q, error_v = floats(s, STATE.q_guess), floats(s, STATE.v_guess)
+    _put_begin(s, h, shifted)
+    set_inputs(m, s, floats(s, STATE.clock)[CLOCK.t], False)
+    run_part(m, s, PARTS.residual)
+    n, largest = free.shape[0], 0.0
+    b[:] = 0.0
+    for j in range(n):
+        c = free[j]
+        b[j] = -(v[c] - _embedded(stage_q, q_n, c, h) - gmu[c]) / c0
+        b[n + j] = -r2[c] / (c0 * c0)
+    run_part(m, s, PARTS.newton_solution)
+    for j in range(n):
+        c = free[j]
+        error_q[c], error_v[c] = x[j], c0 * x[n + j]
+        largest = max(largest, abs(error_q[c]) / wq[c])
+        if second[c]:
+            largest = max(largest, abs(error_v[c]) / wv[c])
+    return largest
+
+
+@compiled
+def _next_size(control, h, error, iterations):
+    """Size of the step behind an accepted one, from its error and that of the step before (Gustafsson 1994)."""
+    effort = (1.0 + 2.0 * MAX_ITERATIONS) / (iterations + 2.0 * MAX_ITERATIONS)
+    error = max(error, 1e-10)
+    factor = SAFETY * effort * error ** (-1.0 / ORDER_OF_ERROR)
+    before = control[CONTROL.error_before]
+    if before > 0.0:
+        predicted = h / control[CONTROL.h_before] * (before / (error * error)) ** (1.0 / ORDER_OF_ERROR)
+        factor = min(factor, SAFETY * predicted)
+    factor = min(GROW, max(SHRINK, factor))
+    return h if 1.0 <= factor < DEAD_ZONE else h * factor
+
+
+@compiled
+def radau5_step(m, s, o, h):
+    """One step of size h into w. Gives (code, iterations, weighted local error).
+
+    Where the error is small enough, control[CONTROL.wanted] is the size that the next step should have.
+    """
+    t, control = floats(s, STATE.clock)[CLOCK.t], floats(inner(s, STATE.radau), RADAU.control)
+    started = ints(s, STATE.counts)[COUNTS.restart] == 1
+    if started:
+        control[CONTROL.error_before] = 0.0
+    code, iterations = solve_stages(m, s, o, t, h, started)
+    if code != NEWTON.converged:
+        return code, iterations, 0.0
+    error = _error(m, s, h, False)
+    if error > 1.0 and (started or control[CONTROL.rejected] == 1.0):
+        error = _error(m, s, h, True)
+    control[CONTROL.rejected] = 1.0 if error > 1.0 else 0.0
+    if error > 1.0 and not o.fixed_step > 0.0:
+        return code, iterations, error
+    take_last_stage(s, h, REAL / h)
+    if not close_constraints(m, s, o, REAL / h):
+        return NEWTON.diverged, iterations, error
+    control[CONTROL.wanted] = _next_size(control, h, error, iterations)
+    control[CONTROL.error_before] = max(error, LEAST_ERROR)
+    remember_stages(s, h)
+    return code, iterations, error
