@@ -22,6 +22,8 @@ from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 8.0
 DEAD_ZONE = 1.2
+CONTRACTING = 0.4
+"""Contraction that the iteration should show with matrices made for the step: a larger step would end in failures."""
 LEAST_ERROR = 1e-2
 """Error that a step is taken to have made at least when the next one is predicted."""
 
@@ -81,8 +83,13 @@ def _error(m, s, h, shifted):
 
 
 @compiled
-def _next_size(control, h, error, iterations):
-    """Size of the step behind an accepted one, from its error and that of the step before (Gustafsson 1994)."""
+def _next_size(s, h, error, iterations):
+    """Size of the step behind an accepted one, from its error and that of the step before (Gustafsson 1994).
+
+    Where matrices of this very step contracted slowly, it is that at which they would do better: contraction goes with
+    the change of phi_q over a step.
+    """
+    clock, control = floats(s, STATE.clock), floats(inner(s, STATE.radau), RADAU.control)
     effort = (1.0 + 2.0 * MAX_ITERATIONS) / (iterations + 2.0 * MAX_ITERATIONS)
     error = max(error, 1e-10)
     factor = SAFETY * effort * error ** (-1.0 / ORDER_OF_ERROR)
@@ -90,6 +97,8 @@ def _next_size(control, h, error, iterations):
     if before > 0.0:
         predicted = h / control[CONTROL.h_before] * (before / (error * error)) ** (1.0 / ORDER_OF_ERROR)
         factor = min(factor, SAFETY * predicted)
+    if ints(s, STATE.counts)[COUNTS.age] == 0:
+        factor = min(factor, CONTRACTING / max(clock[CLOCK.contraction], 1e-3))
     factor = min(GROW, max(SHRINK, factor))
     return h if 1.0 <= factor < DEAD_ZONE else h * factor
 
@@ -116,7 +125,7 @@ def radau5_step(m, s, o, h):
     take_last_stage(s, h, REAL / h)
     if not close_constraints(m, s, o, REAL / h):
         return NEWTON.diverged, iterations, error
-    control[CONTROL.wanted] = _next_size(control, h, error, iterations)
+    control[CONTROL.wanted] = _next_size(s, h, error, iterations)
     control[CONTROL.error_before] = max(error, LEAST_ERROR)
     remember_stages(s, h)
     return code, iterations, error

@@ -17,7 +17,7 @@ from dms_core.simulation.radau_state import RADAU
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 MAX_ITERATIONS = 10
-MAX_CLOSINGS = 6
+MAX_CLOSINGS = 20
 MIDDLE = 1
 """Stage at whose guess the matrices are evaluated: it lies nearest to the middle of the step."""
 KEEP = 0.02
@@ -125,12 +125,12 @@ def close_constraints(m, s, o, c0):
     q, v, phi, phi_v = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.phi), floats(w, WORK.phi_v)
     free, k = naturals(m, MODEL.free), active.shape[0]
     n, before = free.shape[0], math.inf
-    for _ in range(MAX_CLOSINGS):
+    for closing in range(MAX_CLOSINGS):
         run_part(m, s, PARTS.constraints)
         error, error_v = largest_errors(s)
         if error <= o.constraint_tol:
-            enough = o.constraint_tol if error_v < 0.5 * before else o.constraint_tol * max(1.0, 1e-3 * c0)
-            if error_v <= enough:
+            rounding = closing > 1 and error_v > STALLED * before
+            if error_v <= o.constraint_tol * (max(1.0, 1e-3 * c0) if rounding else 1.0):
                 return True
         before = error_v
         b[: 2 * n] = 0.0

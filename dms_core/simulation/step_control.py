@@ -193,7 +193,7 @@ def one_step(m, s, o, stop, kept):
         else:
             count[COUNTS.rejected_newton] += 1
             count[COUNTS.stale] = 1
-            wanted = 0.25 * h
+            wanted = h * (0.5 if o.method == METHOD.radau5 else 0.25)
             # Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
             if first_try and o.method == METHOD.sdirk2:
                 set_inputs(m, s, clock[CLOCK.t], False)
