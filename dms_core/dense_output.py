@@ -3,7 +3,8 @@
 Methods of order 2 take a cubic. Radau IIA's steps are ten times as long, and its own collocation polynomial is of order
 3 only (Hairer and Wanner 1996, IV.8); the record holds more, namely accelerations that belong to q and v. So
 
-* a second-order coordinate is the quintic through q, v, vdot at both ends (error h^6), v and vdot its slopes (h^5, h^4);
+* a second-order coordinate is the quintic through q, v, vdot at both ends (error h^6), v and vdot are its slopes (h^5,
+  h^4);
 * a first-order one is the cubic through q and its rate at both ends (h^4), as good as the collocation polynomial;
 * multipliers are the cubic through four neighbouring steps, never across a jump of an input (h^4).
 """
@@ -28,7 +29,10 @@ def quintic(t, q, v, a, start, times, second):  # noqa: ANN001, ANN201
     """q, v, vdot at times between the recorded steps `start` and `start + 1`, shape (k, n_q) each.
 
     Args:
-        t, q, v, a: the record, shapes (n,) and (n, n_q).
+        t: recorded times [s], shape (n,).
+        q: recorded coordinates, shape (n, n_q).
+        v: recorded velocities.
+        a: recorded accelerations.
         start: step at or before each time, shape (k,).
         times: [s], shape (k,).
         second: True for second-order coordinates, shape (n_q,).

@@ -4,8 +4,10 @@ Right-looking elimination (Duff, Erisman and Reid 2017, ch. 10): step k divides 
 subtracts multiples of its row from theirs. All targets are tabulated (symbolic.py), so that a factorisation is one
 pass through a list of blocks of eight numbers. The storage array `a` holds the matrix before (zeroed, then
 a[tables.position[e]] += value[e]), and after it L below and U right of the diagonal, with the inverse of each pivot in
-its place. Everything is compiled to be called from compiled code; the same input gives the same bits. Numbers are real, or all
-arrays are complex (the storage then has room for twice as many reals: storage(2 * tables.size).view(complex)).
+its place. Everything is compiled to be called from compiled code; the same input gives the same bits.
+
+Numbers are real, or all arrays are complex; storage is then asked for twice as many reals, and seen as complex:
+storage(2 * tables.size).view(complex).
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ from dms_core.simulation.parts import ADVANCE, PARTS, RATES, RESTART, STAGE, STE
 def part_addresses(radau: bool = False) -> np.ndarray:
     """Addresses in the order of `parts.Parts`, shape (len(PARTS),); constant, shared by all worlds of a method.
 
-    Those of Radau IIA are compiled where `radau` asks for them, and 0 elsewhere. What builds on the others is compiled by a second process at the same time, if it is registered there.
+    Those of Radau IIA are compiled where `radau` asks for them, and 0 elsewhere. What builds on the others is compiled
+    by a second process at the same time, if it is registered there.
     """
     found = Parts(
         **{name: address(getattr(evaluation, name), PART) for name in Parts._fields[: PARTS.solve_stage]},

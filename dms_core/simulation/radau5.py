@@ -21,7 +21,6 @@ from dms_core.simulation.radau_state import CONTROL, RADAU
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 8.0
-DEAD_ZONE = 1.2
 CONTRACTING = 0.4
 """Contraction that the iteration should show with matrices made for the step: a larger step would end in failures."""
 LEAST_ERROR = 1e-2
@@ -87,7 +86,8 @@ def _next_size(s, h, error, iterations):
     """Size of the step behind an accepted one, from its error and that of the step before (Gustafsson 1994).
 
     Where matrices of this very step contracted slowly, it is that at which they would do better: contraction goes with
-    the change of phi_q over a step.
+    the change of phi_q over a step. There is no zone in which h is left alone: see step_control.py, and the matrices
+    are kept over small changes anyway.
     """
     clock, control = floats(s, STATE.clock), floats(inner(s, STATE.radau), RADAU.control)
     effort = (1.0 + 2.0 * MAX_ITERATIONS) / (iterations + 2.0 * MAX_ITERATIONS)
@@ -99,8 +99,7 @@ def _next_size(s, h, error, iterations):
         factor = min(factor, SAFETY * predicted)
     if ints(s, STATE.counts)[COUNTS.age] == 0:
         factor = min(factor, CONTRACTING / max(clock[CLOCK.contraction], 1e-3))
-    factor = min(GROW, max(SHRINK, factor))
-    return h if 1.0 <= factor < DEAD_ZONE else h * factor
+    return h * min(GROW, max(SHRINK, factor))
 
 
 @compiled

@@ -17,6 +17,8 @@ from dms_core.simulation.radau_state import RADAU
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 MAX_ITERATIONS = 10
+MAX_FIXED_ITERATIONS = 40
+"""Where the step is fixed, so that a slow iteration cannot be helped by a shorter one."""
 MAX_CLOSINGS = 20
 MIDDLE = 1
 """Stage at whose guess the matrices are evaluated: it lies nearest to the middle of the step."""
@@ -150,7 +152,8 @@ def iterate(m, s, o, t, h, fresh):
     clock, count, c0 = floats(s, STATE.clock), ints(s, STATE.counts), REAL / h
     contraction, before, enough = clock[CLOCK.contraction], 0.0, tolerance(o)
     failed = NEWTON.diverged if fresh else NEWTON.stale_matrix
-    for k in range(MAX_ITERATIONS):
+    most = MAX_FIXED_ITERATIONS if fresh and o.fixed_step > 0.0 else MAX_ITERATIONS
+    for k in range(most):
         evaluate_stages(m, s, t, h)
         right_hand_sides(m, s, c0)
         run_part(m, s, PARTS.radau_solutions)
@@ -171,11 +174,11 @@ def iterate(m, s, o, t, h, fresh):
             if k > 0 and contraction > KEEP and not stalled:
                 count[COUNTS.stale] = 1
             return NEWTON.converged, k + 1
-        rest = left * contraction ** (MAX_ITERATIONS - 1 - k)
+        rest = left * contraction ** (most - 1 - k)
         if k > 0 and rest > o.newton_tol or k >= 3 and not fresh and contraction > 0.2:
             return failed, k + 1
         before = norm
-    return failed, MAX_ITERATIONS
+    return failed, most
 
 
 @compiled

@@ -13,7 +13,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.simulation.parts import PARTS, run_part, set_inputs
 from dms_core.simulation.radau_constants import A_INVERSE, STAGES, C
 from dms_core.simulation.radau_state import CONTROL, RADAU
-from dms_core.simulation.state import CLOCK, STATE
+from dms_core.simulation.state import STATE
 
 
 @compiled

@@ -57,15 +57,15 @@ def new_radau_state(tables: Tables, n_phi: int, used: bool) -> RadauState:
     n = len(tables.second) if used else 0
     m = n_phi if used else 0
     size = 2 * (len(tables.free) + len(tables.active)) if used else 0
-    lu, k = tables.newton_lu, 2 if used else 0
+    lu = tables.newton_lu
     stages, past = {"q": n, "v": n, "lam": m, "mu": m}, {"past_lam": m, "past_mu": m}
     return RadauState(
         control=np.zeros(len(CONTROL)),
         **{name: np.zeros((STAGES, width)) for name, width in (stages | past).items()},
         **{name: np.zeros((1 + STAGES, n)) for name in ("past_q", "past_v")},
         residual=np.zeros((STAGES, size)),
-        values=storage(k * lu.size),
-        work=storage(k * lu.work_size),
+        values=storage(2 * lu.size) if used else np.zeros(0),
+        work=storage(2 * lu.work_size) if used else np.zeros(0),
         b=np.zeros(2 * size),
         x=np.zeros(2 * size),
     )  # fmt: skip

@@ -1,8 +1,10 @@
 """The loop over steps: size, acceptance, jumps of the inputs, recording.
 
 The next size is 0.9 err^(-1/3) h (order 2), lowered when Newton needed many iterations (paper sect. 2.3; the formula
-is that of Hairer and Wanner 1996, IV.8), and left alone when it would change by less than a fifth: an unchanged step
-keeps the factorised matrix good. Radau IIA has a rule of its own (radau5.py).
+is that of Hairer and Wanner 1996, IV.8), and left alone when it would grow by less than a tenth, for SDIRK2 throughout
+a fifth: an unchanged step keeps the factorised matrix good. For BDF2 that zone must be small. Its leading error cancels
+over a reversible motion, such as a body that tumbles, only if steps depend on the state and not on the way there: with
+a fifth, a tumbling body errs by two to five times as much. Radau IIA has a rule of its own (radau5.py).
 """
 
 import math
@@ -36,7 +38,7 @@ class Outcome(NamedTuple):
 OUTCOME = fields(Outcome)
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
-DEAD_ZONE = 1.2
+DEAD_ZONE, ONE_STEP_DEAD_ZONE = 1.1, 1.2
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
 NEAR = 32
@@ -149,12 +151,12 @@ def try_step(m, s, o, h, started):
 
 
 @compiled
-def resize(h, error, iterations):
-    """The next step size from the error and the Newton count."""
+def resize(h, error, iterations, dead_zone):
+    """The next step size from the error and the Newton count; h where it would grow by less than `dead_zone`."""
     effort = (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
     factor = GROW if error <= 0.0 else SAFETY * effort * error ** (-1.0 / 3.0)
     factor = min(GROW, max(SHRINK, factor))
-    return h if 1.0 <= factor < DEAD_ZONE else h * factor
+    return h if 1.0 <= factor < dead_zone else h * factor
 
 
 @compiled
@@ -162,7 +164,7 @@ def size_behind(s, o, h, error, iterations):
     """Size that the step behind an accepted one should have."""
     if o.method == METHOD.radau5:
         return floats(inner(s, STATE.radau), RADAU.control)[CONTROL.wanted]
-    return resize(h, error, iterations)
+    return resize(h, error, iterations, DEAD_ZONE if o.method == METHOD.bdf2 else ONE_STEP_DEAD_ZONE)
 
 
 @compiled
@@ -206,8 +208,8 @@ def one_step(m, s, o, stop, kept):
     accept(s, h, c0, started)
     if h == rest:
         land(s, stop)
-    # Multipliers and accelerations of a stage are of order 1 (Radau IIA: 3); those that belong to its q and v are of the
-    # method's order. Methods without a past want them between two landings only for a record.
+    # Multipliers and accelerations of a stage are of order 1 (Radau IIA: 3); those that belong to its q and v are of
+    # the method's order. Methods without a past want them between two landings only for a record.
     wanted_rates = started if o.method == METHOD.bdf2 else kept or h == rest
     stage_c0 = c0 if h == rest and o.method == METHOD.sdirk2 else 0.0
     if (
@@ -220,7 +222,8 @@ def one_step(m, s, o, stop, kept):
         clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
         if h == rest or not first_try:
             clock[CLOCK.h_wanted] = max(
-                resize(h, clock[CLOCK.worst], iterations), wanted if h < wanted and first_try else 0.0
+                resize(h, clock[CLOCK.worst], iterations, ONE_STEP_DEAD_ZONE),
+                wanted if h < wanted and first_try else 0.0,
             )
             clock[CLOCK.worst] = 0.0
     elif not fixed:
