@@ -11,7 +11,7 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals
-from dms_core.dense_output import cubic, lagrange, neighbours, quintic
+from dms_core.dense_output import Rates, cubic, quintic
 from dms_core.errors import DmsError, InputError, SimulationError, choices
 from dms_core.flags import Flag, Limits, input_values
 
@@ -81,7 +81,7 @@ class Trajectory:
         result: Result,
         stats: SolveStats,
         message: str,
-        high_order: bool = False,
+        rates: Rates | None = None,
     ) -> None:
         n, m = model.n_q, model.n_phi
         self.model, self.signals = model, signals
@@ -89,7 +89,7 @@ class Trajectory:
         self.q, self.v, self.a = (record[:, 1 + k * n : 1 + (k + 1) * n].copy() for k in range(3))
         self._lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
         self.mu = record[:, 1 + 3 * n + m :].copy()
-        self.result, self.stats, self._message, self._high_order = result, stats, message, high_order
+        self.result, self.stats, self._message, self._rates = result, stats, message, rates
 
     @cached_property
     def flags(self) -> tuple[Flag, ...]:
@@ -138,7 +138,8 @@ class Trajectory:
 
         q is the cubic through q and v at both ends of a step, v that through v and vdot (for first-order coordinates
         the slope of q), vdot its slope; lam and mu are linear in a step. All are of the order of BDF2 and SDIRK2, 2.
-        A run of Radau IIA takes more: see dense_output.py.
+        Behind Radau IIA second-order coordinates are the quintic of dense_output.py, of order 5, and vdot and lam solve
+        the equations at its q and v.
 
         Args:
             times: [s], shape (k,), between the first and the last recorded time.
@@ -155,23 +156,25 @@ class Trajectory:
             )
         end = np.clip(np.searchsorted(self.t, times, side="left"), 1, len(self.t) - 1)
         start = end - 1
-        unique, whole = self.model.unique_multipliers, self._whole_lam
+        h = (self.t[end] - self.t[start])[:, None]
+        h = np.where(h > 0.0, h, 1.0)
+        x = (times - self.t[start])[:, None] / h
+        between = lambda values: (1.0 - x) * values[start] + x * values[end]  # noqa: E731
+        mu, least = between(self.mu), [c.least for c in self.model.layout.coordinates]
+        if self._rates is not None:
+            ends = [(y[start], y[end]) for y in (self.q, self.v, self.a)]
+            q, v, a = quintic(x, h, ends, self.model.second_order)
+            q = np.maximum(q, least)
+            v, a, lam = self._rates(self.model, self.signals, times, q, v, a, between(self._lam))
+            lam = self.model.whole_multipliers(self.signals, times, q, v, a, lam, np.zeros(len(times), bool))
+            return States(self.model, self.signals, times, q, v, a, self.model.unique_multipliers(q, lam), mu)
         second = self.model.second_order
-        if self._high_order:
-            q, v, a = quintic(self.t, self.q, self.v, self.a, start, times, second)
-            around = neighbours(self.t, start)
-            lam = lagrange(self.t, [unique(self.q[k], whole[k]) for k in around], around, times)
-            mu = lagrange(self.t, [self.mu[k] for k in around], around, times)
-        else:
-            h = (self.t[end] - self.t[start])[:, None]
-            h = np.where(h > 0.0, h, 1.0)
-            x = (times - self.t[start])[:, None] / h
-            q, slope_q, _ = cubic(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
-            v, slope_v, _ = cubic(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
-            v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
-            lam = (1.0 - x) * unique(self.q[start], whole[start]) + x * unique(self.q[end], whole[end])
-            mu = (1.0 - x) * self.mu[start] + x * self.mu[end]
-        q = np.maximum(q, [c.least for c in self.model.layout.coordinates])
+        q, slope_q, _ = cubic(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
+        v, slope_v, _ = cubic(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
+        unique, whole = self.model.unique_multipliers, self._whole_lam
+        lam = (1.0 - x) * unique(self.q[start], whole[start]) + x * unique(self.q[end], whole[end])
+        q = np.maximum(q, least)
+        v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
         return States(self.model, self.signals, times, q, v, a, lam, mu)
 
     def grid(self, sample: float) -> np.ndarray:

@@ -20,6 +20,7 @@ from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
+from dms_core.simulation.rates_between import rates_between
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
 from dms_core.simulation.step_control import OUTCOME
@@ -301,8 +302,10 @@ class Simulation(World):
                 raise KeyboardInterrupt
             raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
-        record, high_order = np.concatenate(self._rows), self.options.method == "radau5"
-        return Trajectory(self.model, signals, record, self.result, self.stats(), self.message, high_order)
+        rates = rates_between if self.options.method == "radau5" else None
+        return Trajectory(
+            self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message, rates
+        )
 
 
 def simulate(

@@ -10,8 +10,9 @@ from typing import Any, Literal
 from dms_core.errors import InputError, choices
 from dms_core.simulation.state import METHOD, Options
 
+MethodName = Literal["bdf2", "sdirk2", "radau5"]
+"""A method of integration, see `SolverOptions.method`."""
 METHODS = METHOD._fields
-"""Names of the methods of integration."""
 MOST_STEPS = 2**62
 """Counts are whole numbers of 64 bits."""
 
@@ -42,7 +43,7 @@ class SolverOptions:
     """Largest |phi| left by a step [m or -], and |phi_q v| [m/s or 1/s] (above 1000 / s, 1e-3 c0 times as much)."""
     max_steps: int = 10_000_000
     """Steps after which a run gives up."""
-    method: Literal["bdf2", "sdirk2", "radau5"] = "bdf2"
+    method: MethodName = "bdf2"
     """'bdf2': of order 2, the paper's. 'sdirk2': of order 2, needs no past: quicker where inputs jump every few steps,
     slower in smooth motion. 'radau5': Radau IIA of order 5, for errors below about 1e-5 of the motion."""
 
