@@ -119,7 +119,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("method", ["bdf2", "sdirk2"])
+@pytest.mark.parametrize("method", ["bdf2", "sdirk2", "radau5"])
 @pytest.mark.parametrize("case", CASES)
 def test_the_run_is_that_of_the_whole_system(case, method):
     system, options = CASES[case](), SolverOptions(rtol=1e-6, method=method)

@@ -31,7 +31,7 @@ def _options(rtol: float) -> SolverOptions:
 
 
 @cache
-def _problem(name: str) -> dict:
+def problem(name: str) -> dict:
     return json.loads((REFERENCE / "dae" / f"{name}.json").read_text())
 
 
@@ -53,7 +53,7 @@ def _start(facts: dict) -> dict[str, tuple[float, float]]:
 @cache
 def andrews(name: str) -> Model:
     """The mechanism at the start of that file."""
-    facts = _problem(name)["definition"]
+    facts = problem(name)["definition"]
     points = {k: np.array([*xy, 0.0]) for k, xy in _start(facts).items()}
     bodies = {}
     for body in facts["bodies"]:
@@ -112,7 +112,7 @@ def test_redundant_rows_of_the_planar_loops():
 
 def test_iftomm_form():
     """41 times over 0.05 s, more than five turns of the crank."""
-    rows = np.array(_problem("iftomm_A03_andrews")["reference"]["rows"])
+    rows = np.array(problem("iftomm_A03_andrews")["reference"]["rows"])
     run = simulate(andrews("iftomm_A03_andrews"), 0.05, _options(1e-7)).check()
     beta = np.unwrap(run.sensors(np.linspace(0.0, 0.05, 2001))["beta.angle"])
     np.testing.assert_allclose(beta[::50], rows[:, 1], atol=3e-5)
@@ -126,7 +126,7 @@ def test_iftomm_form():
 
 def test_index_3_form_of_the_test_set():
     """All angles, rates and accelerations at 0.03 s, and the two multipliers that are the force at E."""
-    y_ref = np.array(_problem("ivp_andrews_index3")["reference"]["recomputed_y"])
+    y_ref = np.array(problem("ivp_andrews_index3")["reference"]["recomputed_y"])
     run = simulate(andrews("ivp_andrews_index3"), 0.03, _options(1e-9)).check()
     y = {name: values[0] for name, values in run.sensors([0.03]).items()}
     turn = 2.0 * np.pi
@@ -143,7 +143,7 @@ def test_index_3_form_of_the_test_set():
 @pytest.mark.parametrize("name", ["iftomm_A03_andrews", "ivp_andrews_index3"])
 def test_start_of_the_test_set(name):
     """Accelerations and force at the start, where nothing moves."""
-    facts = _problem("ivp_andrews_index3")["definition"]["initial"]
+    facts = problem("ivp_andrews_index3")["definition"]["initial"]
     y = {key: values[0] for key, values in simulate(andrews(name), 1e-6).sensors().items()}
     assert abs(y["beta.rate"]) < 1e-9
     # The two forms start 3e-4 rad apart.

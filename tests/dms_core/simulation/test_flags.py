@@ -42,6 +42,7 @@ ACCURACIES = {
     "loose": SolverOptions(rtol=1e-3),
     "rough": SolverOptions(rtol=1e-2),
     "sdirk2": SolverOptions(method="sdirk2"),
+    "radau5": SolverOptions(method="radau5"),
     "rough sdirk2": SolverOptions(method="sdirk2", rtol=1e-2),
     "fixed 0.01": SolverOptions(fixed_step=0.01),
     "fixed 0.001": SolverOptions(fixed_step=0.001),
@@ -182,6 +183,7 @@ OPTIONS = {
     "bdf2": SolverOptions(),
     "loose": SolverOptions(rtol=1e-3),
     "sdirk2": SolverOptions(method="sdirk2"),
+    "radau5": SolverOptions(method="radau5"),
     "fixed": SolverOptions(fixed_step=1e-3),
     "fixed sdirk2": SolverOptions(fixed_step=1e-3, method="sdirk2"),
 }

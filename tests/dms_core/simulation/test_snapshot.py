@@ -30,7 +30,7 @@ from dms_core.simulation.dynamics import Simulation, SolverOptions, World
 from dms_core.simulation.snapshot import GLOBAL_WORK, held_arrays
 from tests.dms_core.assembly.specimen import specimen
 
-METHODS = ("bdf2", "sdirk2")
+METHODS = ("bdf2", "sdirk2", "radau5")
 LOCAL_WORK = {
     "q_l", "v_l", "a_l", "lam_l", "u_l", "r_l", "Jq", "Jv", "Ja", "phi_l", "phi_t_l", "G", "W", "H", "y_l", "Yq", "Yv",
     "Ya", "Yl", "Yu",
@@ -225,7 +225,8 @@ def test_every_array_of_a_world_is_held_or_local(hanging):
     held = {id(x) for x in held_arrays(state)}
     left_out = {name for name, x in zip(state._fields, state, strict=True) if id(x) not in held}
     # `parts` are addresses of machine code, the same for all worlds of a process.
-    assert left_out <= {"w", "signals", "parts"}
+    assert left_out <= {"w", "signals", "parts", "radau"}
+    assert {id(x) for x in state.radau} <= held
 
 
 @pytest.mark.parametrize(

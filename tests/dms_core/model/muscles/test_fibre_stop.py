@@ -42,6 +42,8 @@ OPTIONS = {
     "loose": SolverOptions(rtol=1e-3),
     "tight": SolverOptions(rtol=1e-6),
     "sdirk2": SolverOptions(method="sdirk2"),
+    "radau5": SolverOptions(method="radau5"),
+    "tight radau5": SolverOptions(method="radau5", rtol=1e-9),
 }
 COARSE = {
     "loose sdirk2": SolverOptions(method="sdirk2", rtol=1e-3),
