@@ -9,20 +9,24 @@ error estimate is that of an embedded formula of order 3, put through the matrix
 so that whatever a multiplier can take up is no error; multipliers themselves are not part of it.
 """
 
+import math
+
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import flags, floats, inner, ints, matrix, naturals
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.newton import NEWTON
 from dms_core.simulation.parts import PARTS, run_part, set_inputs
-from dms_core.simulation.radau_constants import ERROR, ORDER_OF_ERROR, REAL
+from dms_core.simulation.radau_constants import ERROR, ORDER_OF_ERROR, REAL, STAGES
 from dms_core.simulation.radau_newton import MAX_ITERATIONS, close_constraints, solve_stages
-from dms_core.simulation.radau_stages import remember_stages, take_last_stage
+from dms_core.simulation.radau_stages import rate, remember_stages, take_last_stage
 from dms_core.simulation.radau_state import CONTROL, RADAU
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 8.0
 CONTRACTING = 0.4
 """Contraction that the iteration should show with matrices made for the step: a larger step would end in failures."""
+PROJECTED = 0.1
+"""Share of what the projection moves that counts as error: most of it is none at the end of the step."""
 LEAST_ERROR = 1e-2
 """Error that a step is taken to have made at least when the next one is predicted."""
 
@@ -75,9 +79,29 @@ def _error(m, s, h, shifted):
     for j in range(n):
         c = free[j]
         error_q[c], error_v[c] = x[j], c0 * x[n + j]
-        largest = max(largest, abs(error_q[c]) / wq[c])
+        size = abs(error_q[c]) / wq[c]
         if second[c]:
-            largest = max(largest, abs(error_v[c]) / wv[c])
+            size = max(size, abs(error_v[c]) / wv[c])
+        if not size < math.inf or not error_v[c] < math.inf:
+            return math.inf
+        largest = max(largest, size)
+    return largest
+
+
+@compiled
+def _projection(m, s, h):
+    """Largest weighted h |v - qdot| = h |phi_q^T mu| of the stages: how far the projection moves positions in a step.
+
+    The estimate above says nothing where constraints alone rule the motion, as in a linkage that is driven: there it is
+    0 at any step, even one that ends in another closure of the loop. This goes with h^4, too.
+    """
+    radau, second, wq = inner(s, STATE.radau), flags(m, MODEL.second), floats(s, STATE.wq)
+    stage_q, stage_v, q_n = matrix(radau, RADAU.q), matrix(radau, RADAU.v), floats(s, STATE.q)
+    largest = 0.0
+    for i in range(STAGES):
+        for k in range(q_n.shape[0]):
+            if second[k]:
+                largest = max(largest, h * abs(stage_v[i, k] - rate(i, stage_q, q_n, k, h)) / wq[k])
     return largest
 
 
@@ -118,10 +142,12 @@ def radau5_step(m, s, o, h):
     error = _error(m, s, h, False)
     if error > 1.0 and (started or control[CONTROL.rejected] == 1.0):
         error = _error(m, s, h, True)
+    error = max(error, PROJECTED * _projection(m, s, h))
     control[CONTROL.rejected] = 1.0 if error > 1.0 else 0.0
     if error > 1.0 and not o.fixed_step > 0.0:
         return code, iterations, error
     take_last_stage(s, h, REAL / h)
+    set_inputs(m, s, t + h, True)
     if not close_constraints(m, s, o, REAL / h):
         return NEWTON.diverged, iterations, error
     control[CONTROL.wanted] = _next_size(s, h, error, iterations)

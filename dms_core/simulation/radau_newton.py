@@ -59,7 +59,9 @@ def _add(stages, c, real, pair):
         t = T[i]
         change = t[0] * real + t[1] * pair.real + t[2] * pair.imag
         stages[i, c] += change
-        largest = max(largest, abs(change))
+        # What is not finite counts as the largest; max() may lose it.
+        if not abs(change) <= largest:
+            largest = abs(change)
     return largest
 
 

@@ -38,7 +38,7 @@ def problem(name: str) -> dict:
 def _start(facts: dict) -> dict[str, tuple[float, float]]:
     """Points at the start, from all digits of the angles where the file has them: points carry twelve decimals."""
     points = {**facts["ground_points"], **facts["initial_points"]}
-    if "initial" not in facts:
+    if "q" not in facts["initial"]:
         return points
     beta, _, gamma, _, delta, _, epsilon = facts["initial"]["q"]
     way = {"F": ("O", "rr", beta), "E": ("B", "ss", gamma - np.pi / 2), "G": ("A", "zt", delta),

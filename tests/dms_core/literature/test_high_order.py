@@ -1,4 +1,4 @@
-"""Radau IIA where digits are wanted: errors below 1e-8, constraints below 1e-10, against references of twelve digits."""
+"""Radau IIA for digits: errors below 1e-8, constraints below 1e-10, against references of twelve digits."""
 
 from __future__ import annotations
 

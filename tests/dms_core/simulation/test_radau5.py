@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dms_core import Model, Result, Simulation, SolverOptions, Trajectory, World, simulate
-from dms_core.model import Input, LumpedLoad, Steps
+from dms_core import Model, Result, Simulation, SolverOptions, System, Trajectory, World, simulate
+from dms_core.model import Harmonic, Input, LineGuide, LumpedLoad, PathPoint, PointMass, RopeLength, Steps
 from dms_core.simulation.radau_constants import A_INVERSE, COMPLEX, ERROR, REAL, STAGES, T_INVERSE, A, C, T
 from tests.dms_core.literature.chain import chain
 
@@ -139,6 +139,42 @@ def test_order_five_across_jumps(pulled):
     for what in ("q", "v", "lam"):
         errors = [float(np.abs(getattr(run, what)[-1] - getattr(exact, what)[-1]).max()) for run in runs]
         assert _rates(errors)[0] > 4.5, (what, errors)
+
+
+OMEGA = 7.0
+
+
+def _driven() -> Model:
+    """A ball on a rope that a harmonic pays out: 0.2 m sin(7 t) about 1 m, straight below the eye."""
+    return Model(
+        System(
+            bodies=[PointMass(name="ball", mass=2.0, position=(0.0, -1.0, 0.0))],
+            constraints=[
+                RopeLength(
+                    name="rope",
+                    path=(PathPoint(point=(0.0, 0.0, 0.0)), PathPoint(body="ball", point=(0.0, 0.0, 0.0))),
+                    input="length",
+                ),
+                LineGuide(name="rail", body_j="ball", axis_i=(0.0, 1.0, 0.0)),
+            ],
+            inputs=[
+                Input(name="length", signal=Harmonic(offset=1.0, amplitude=0.2, frequency=OMEGA / (2.0 * np.pi))),
+            ],
+        )
+    )
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+def test_a_motion_that_constraints_alone_rule(rtol):
+    """Nothing is integrated: steps are exact, inputs those of the very time, and short enough for what lies between."""
+    run = simulate(_driven(), 2.0, radau(rtol)).check()
+    for states, error in ((run.own_steps(), 1e-12), (run.at(np.linspace(0.0, 2.0, 501)), rtol)):
+        way = -0.2 * np.sin(OMEGA * states.t)
+        np.testing.assert_allclose(states.coordinate("ball.y"), -1.0 + way, atol=error)
+        np.testing.assert_allclose(states.a[:, 1], -(OMEGA**2) * way, atol=OMEGA**2 * 100.0 * error)
+        np.testing.assert_allclose(states.rate("ball.y"), -0.2 * OMEGA * np.cos(OMEGA * states.t), atol=100.0 * error)
+    # h |phi_q^T mu| keeps them short; otherwise they were 0.1 s at every tolerance.
+    assert run.stats.largest_step <= (0.1 if rtol > 1e-6 else 0.05)
 
 
 def test_matrices_are_kept(model):
