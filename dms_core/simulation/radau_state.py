@@ -52,23 +52,31 @@ class RadauState(NamedTuple):
 CONTROL, RADAU = fields(Control), fields(RadauState)
 
 
-def new_radau_state(tables: Tables, n_phi: int, used: bool) -> RadauState:
-    """Fresh arrays; empty ones where they are not used."""
-    n = len(tables.second) if used else 0
-    m = n_phi if used else 0
-    size = 2 * (len(tables.free) + len(tables.active)) if used else 0
-    lu = tables.newton_lu
+def _arrays(n: int, m: int, size: int, lu: tuple[int, int]) -> RadauState:
+    """Arrays for n coordinates, m rows, a system of `size` unknowns whose matrix and work array have lengths `lu`."""
     stages, past = {"q": n, "v": n, "lam": m, "mu": m}, {"past_lam": m, "past_mu": m}
     return RadauState(
         control=np.zeros(len(CONTROL)),
         **{name: np.zeros((STAGES, width)) for name, width in (stages | past).items()},
         **{name: np.zeros((1 + STAGES, n)) for name in ("past_q", "past_v")},
         residual=np.zeros((STAGES, size)),
-        values=storage(2 * lu.size) if used else np.zeros(0),
-        work=storage(2 * lu.work_size) if used else np.zeros(0),
+        values=storage(2 * lu[0]) if lu[0] else np.zeros(0),
+        work=storage(2 * lu[1]) if lu[1] else np.zeros(0),
         b=np.zeros(2 * size),
         x=np.zeros(2 * size),
     )  # fmt: skip
+
+
+NOT_USED = _arrays(0, 0, 0, (0, 0))
+"""Of all worlds that another method runs; nothing is written into it."""
+
+
+def new_radau_state(tables: Tables, n_phi: int, used: bool) -> RadauState:
+    """Fresh arrays, or the empty ones where they are not used."""
+    if not used:
+        return NOT_USED
+    lu, size = tables.newton_lu, 2 * (len(tables.free) + len(tables.active))
+    return _arrays(len(tables.second), n_phi, size, (lu.size, lu.work_size))
 
 
 def is_used(radau: RadauState) -> bool:

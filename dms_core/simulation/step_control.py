@@ -1,10 +1,10 @@
 """The loop over steps: size, acceptance, jumps of the inputs, recording.
 
 The next size is 0.9 err^(-1/3) h (order 2), lowered when Newton needed many iterations (paper sect. 2.3; the formula
-is that of Hairer and Wanner 1996, IV.8), and left alone when it would grow by less than a tenth, for SDIRK2 throughout
-a fifth: an unchanged step keeps the factorised matrix good. For BDF2 that zone must be small. Its leading error cancels
-over a reversible motion, such as a body that tumbles, only if steps depend on the state and not on the way there: with
-a fifth, a tumbling body errs by two to five times as much. Radau IIA has a rule of its own (radau5.py).
+is that of Hairer and Wanner 1996, IV.8). An unchanged step keeps the factorised matrix good. So SDIRK2 throughout
+leaves the step alone when it would grow by less than a fifth, and BDF2 takes the next smaller size of a grid, 1.4^k.
+For BDF2 steps must depend on the state and not on the way there: its leading error cancels over a reversible motion,
+such as a body that tumbles, but not if steps grow late and shrink at once. Radau IIA has a rule of its own (radau5.py).
 """
 
 import math
@@ -38,7 +38,10 @@ class Outcome(NamedTuple):
 OUTCOME = fields(Outcome)
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
-DEAD_ZONE, ONE_STEP_DEAD_ZONE = 1.1, 1.2
+DEAD_ZONE = 1.2
+"""Growth up to which SDIRK2 throughout leaves its step alone."""
+GRID, GRID_SAFETY = math.log(1.4), 0.99
+"""Logarithm of the ratio of neighbouring sizes of BDF2's steps; on average they are a sixth below what is allowed."""
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
 NEAR = 32
@@ -151,12 +154,18 @@ def try_step(m, s, o, h, started):
 
 
 @compiled
-def resize(h, error, iterations, dead_zone):
-    """The next step size from the error and the Newton count; h where it would grow by less than `dead_zone`."""
+def growth(error, iterations, safety):
+    """Next step size over the last, from the error and the Newton count."""
     effort = (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
-    factor = GROW if error <= 0.0 else SAFETY * effort * error ** (-1.0 / 3.0)
-    factor = min(GROW, max(SHRINK, factor))
-    return h if 1.0 <= factor < dead_zone else h * factor
+    factor = GROW if error <= 0.0 else safety * effort * error ** (-1.0 / 3.0)
+    return min(GROW, max(SHRINK, factor))
+
+
+@compiled
+def resize(h, error, iterations):
+    """The next step size of SDIRK2 throughout."""
+    factor = growth(error, iterations, SAFETY)
+    return h if 1.0 <= factor < DEAD_ZONE else h * factor
 
 
 @compiled
@@ -164,7 +173,11 @@ def size_behind(s, o, h, error, iterations):
     """Size that the step behind an accepted one should have."""
     if o.method == METHOD.radau5:
         return floats(inner(s, STATE.radau), RADAU.control)[CONTROL.wanted]
-    return resize(h, error, iterations, DEAD_ZONE if o.method == METHOD.bdf2 else ONE_STEP_DEAD_ZONE)
+    if o.method == METHOD.bdf2:
+        # A size that is on the grid but for rounding stays.
+        place = math.log(h * growth(error, iterations, GRID_SAFETY)) / GRID
+        return math.exp(GRID * math.floor(place + 1e-9))
+    return resize(h, error, iterations)
 
 
 @compiled
@@ -224,7 +237,7 @@ def one_step(m, s, o, stop, kept):
         clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
         if h == rest or not first_try:
             clock[CLOCK.h_wanted] = max(
-                resize(h, clock[CLOCK.worst], iterations, ONE_STEP_DEAD_ZONE),
+                resize(h, clock[CLOCK.worst], iterations),
                 wanted if h < wanted and first_try else 0.0,
             )
             clock[CLOCK.worst] = 0.0
