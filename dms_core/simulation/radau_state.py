@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.assembly.tables import Tables
-from dms_core.compiled.arena import fields
+from dms_core.compiled.arena import Packed, fields
 from dms_core.linear.lu import storage
 from dms_core.simulation.radau_constants import STAGES
 
@@ -67,18 +67,13 @@ def _arrays(n: int, m: int, size: int, lu: tuple[int, int]) -> RadauState:
     )  # fmt: skip
 
 
-NOT_USED = _arrays(0, 0, 0, (0, 0))
+NOT_USED = Packed(_arrays(0, 0, 0, (0, 0)))
 """Of all worlds that another method runs; nothing is written into it."""
 
 
-def new_radau_state(tables: Tables, n_phi: int, used: bool) -> RadauState:
-    """Fresh arrays, or the empty ones where they are not used."""
+def new_radau_state(tables: Tables, n_phi: int, used: bool) -> Packed:
+    """A packed RadauState: fresh arrays, or the empty ones where they are not used."""
     if not used:
         return NOT_USED
     lu, size = tables.newton_lu, 2 * (len(tables.free) + len(tables.active))
-    return _arrays(len(tables.second), n_phi, size, (lu.size, lu.work_size))
-
-
-def is_used(radau: RadauState) -> bool:
-    """Whether the method's arrays are there."""
-    return len(radau.values) > 0
+    return Packed(_arrays(len(tables.second), n_phi, size, (lu.size, lu.work_size)))

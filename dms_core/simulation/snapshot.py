@@ -75,7 +75,7 @@ def _held_parts(state: State) -> Iterator[tuple[str, np.ndarray]]:
     for name, x in state._asdict().items():
         if isinstance(x, np.ndarray) and x.dtype == np.float64:
             yield name, x
-    yield from ((f"radau.{name}", x) for name, x in state.radau._asdict().items())
+    yield from ((f"radau.{name}", x) for name, x in state.radau.values._asdict().items())
 
 
 def _digest(*parts: Any) -> str:

@@ -24,7 +24,7 @@ from dms_core.assembly.tables import WORK, Signals, Tables, Work
 from dms_core.compiled.arena import Packed, fields, floats, inner, ints
 from dms_core.compiled.jit import compiled
 from dms_core.linear.lu import storage
-from dms_core.simulation.radau_state import RadauState, is_used, new_radau_state
+from dms_core.simulation.radau_state import NOT_USED, new_radau_state
 
 
 class Clock(NamedTuple):
@@ -118,8 +118,8 @@ class State(NamedTuple):
     rate_x: np.ndarray
     parts: np.ndarray
     """Addresses of the parts of a step, see parts.py."""
-    radau: RadauState
-    """What Radau IIA carries beside; empty arrays where another method runs."""
+    radau: Packed
+    """A packed RadauState, what Radau IIA carries beside; its arrays are empty where another method runs."""
 
 
 class Method(NamedTuple):
@@ -217,5 +217,5 @@ def with_tables(tables: Tables, state: State) -> Packed:
     state.counts[COUNTS.rates_factored] = 0
     state.lam[:], state.mu[:] = 0.0, 0.0
     state.w.lam[:], state.w.mu[:] = 0.0, 0.0
-    radau = new_radau_state(tables, len(state.lam), is_used(state.radau))
+    radau = new_radau_state(tables, len(state.lam), state.radau is not NOT_USED)
     return Packed(State(**{**state._asdict(), **_linear_arrays(tables), "radau": radau}))

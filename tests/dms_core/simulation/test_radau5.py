@@ -85,7 +85,7 @@ def test_multipliers_of_the_last_stage_are_of_order_three(model, exact):
         world = World(model, radau(1e-12, fixed_step=h))
         assert world.advance(T_END) is Result.SUCCESS
         rows = model.active_rows
-        own = world.state.radau.past_lam[-1]
+        own = world.state.radau.values.past_lam[-1]
         errors.append(float(np.abs(own[rows] - exact._lam[-1][rows]).max()))
     # 2.6 and 2.8 are found.
     assert np.all((_rates(errors) > 2.5) & (_rates(errors) < 3.5)), errors
@@ -204,7 +204,7 @@ def test_advance_in_pieces_is_the_same_run_to_tolerance(model, exact):
 def test_other_methods_pay_nothing(model):
     """No array, and no machine code, of a method that does not run."""
     state = World(model, SolverOptions()).state
-    assert sum(x.size for x in state.radau) == state.radau.control.size
+    assert sum(x.size for x in state.radau.values) == state.radau.values.control.size
     assert np.count_nonzero(state.parts == 0) == 3
     assert np.count_nonzero(World(model, radau()).state.parts == 0) == 0
 

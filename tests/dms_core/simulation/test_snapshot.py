@@ -226,7 +226,7 @@ def test_every_array_of_a_world_is_held_or_local(hanging):
     left_out = {name for name, x in zip(state._fields, state, strict=True) if id(x) not in held}
     # `parts` are addresses of machine code, the same for all worlds of a process.
     assert left_out <= {"w", "signals", "parts", "radau"}
-    assert {id(x) for x in state.radau} <= held
+    assert {id(x) for x in state.radau.values} <= held
 
 
 @pytest.mark.parametrize(
