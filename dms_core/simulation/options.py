@@ -30,10 +30,10 @@ class SolverOptions:
     rtol: float = 1e-5
     """Relative tolerance [-]: the local error of a step is kept below a tenth of atol + rtol |y|.
 
-    The error of a run is larger, by what the motion makes of it. Measured over some turns (docs/digits.md): BDF2 errs by
-    10 to 40 rtol at 1e-5 and 100 to 1000 rtol at 1e-8, as its error falls with rtol^(2/3). Radau IIA, whose estimate is
-    coarse, divides both tolerances by rtol^(1/3); it errs by 1 to 100 rtol, falling with rtol^(5/6). A motion that
-    drives neighbours apart multiplies both, a double pendulum over 10 s by 10^4.
+    The error of a run is larger, by what the motion makes of it. Measured over some turns (docs/digits.md): BDF2 errs
+    by 10 to 100 rtol at 1e-5 and 100 to 1000 rtol at 1e-8, as its error falls with rtol^(2/3). Radau IIA, whose
+    estimate is coarse, divides both tolerances by rtol^(1/3); it errs by 1 to 100 rtol, falling with rtol^(5/6). A
+    motion that drives neighbours apart multiplies both, a double pendulum over 10 s by 10^4.
     """
     atol: float | None = None
     """Absolute tolerance of every variable in its own unit; None takes rtol times each variable's nominal size."""

@@ -221,7 +221,7 @@ def test_a_simulation_records_from_the_restored_time_on(hanging):
 
 def test_every_array_of_a_world_is_held_or_local(hanging):
     assert set(Work._fields) == LOCAL_WORK | set(GLOBAL_WORK)
-    state = _world(hanging, "bdf2").state
+    state = _world(hanging, "radau5").state
     held = {id(x) for x in held_arrays(state)}
     left_out = {name for name, x in zip(state._fields, state, strict=True) if id(x) not in held}
     # `parts` are addresses of machine code, the same for all worlds of a process.
