@@ -40,13 +40,13 @@ def _embedded(stage, start, k, h):
 
 @compiled
 def _put_begin(s, h, shifted):
-    """Begin of the step into the iterate, `shifted` by the estimated error in x, with the rates of that formula."""
+    """Begin of the step into the iterate, `shifted` by the error in cq and cv, with the rates of that formula."""
     w, radau = inner(s, STATE.w), inner(s, STATE.radau)
     q, v, a, lam, mu = (
         floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), floats(w, WORK.lam), floats(w, WORK.mu),
     )  # fmt: skip
     q_n, v_n, lam_n = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.lam)
-    stage_v, error_q, error_v = matrix(radau, RADAU.v), floats(s, STATE.q_guess), floats(s, STATE.v_guess)
+    stage_v, error_q, error_v = matrix(radau, RADAU.v), floats(s, STATE.cq), floats(s, STATE.cv)
     for k in range(q_n.shape[0]):
         q[k], v[k] = q_n[k], v_n[k]
         if shifted:
@@ -59,13 +59,13 @@ def _put_begin(s, h, shifted):
 
 @compiled
 def _error(m, s, h, shifted):
-    """The estimate into q_guess and v_guess; gives its largest weighted component."""
+    """The estimate into cq and cv; gives its largest weighted component."""
     w, b, x, c0 = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), REAL / h
     free, second = naturals(m, MODEL.free), flags(m, MODEL.second)
     v, gmu, r2 = floats(w, WORK.v), floats(w, WORK.gmu), floats(w, WORK.r2)
     stage_q, q_n = matrix(inner(s, STATE.radau), RADAU.q), floats(s, STATE.q)
     wq, wv = floats(s, STATE.wq), floats(s, STATE.wv)
-    error_q, error_v = floats(s, STATE.q_guess), floats(s, STATE.v_guess)
+    error_q, error_v = floats(s, STATE.cq), floats(s, STATE.cv)
     _put_begin(s, h, shifted)
     set_inputs(m, s, floats(s, STATE.clock)[CLOCK.t], False)
     run_part(m, s, PARTS.residual)

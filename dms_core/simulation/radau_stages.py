@@ -124,6 +124,10 @@ def guess_stages(m, s, h, started):
         for c in range(n):
             if not second[c]:
                 stage_v[i, c] = rate(i, stage_q, q, c, h)
+    # Where a run fails, the coordinate that has moved farthest from here is named.
+    q_guess = floats(s, STATE.q_guess)
+    for c in range(n):
+        q_guess[c] = stage_q[STAGES - 1, c]
 
 
 @compiled

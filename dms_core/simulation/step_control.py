@@ -1,17 +1,18 @@
 """The loop over steps: size, acceptance, jumps of the inputs, recording.
 
 The next size is 0.9 err^(-1/3) h (order 2), lowered when Newton needed many iterations (paper sect. 2.3; the formula
-is that of Hairer and Wanner 1996, IV.8). An unchanged step keeps the factorised matrix good. So SDIRK2 throughout
-leaves the step alone when it would grow by less than a fifth, and BDF2 takes the next smaller size of a grid, 1.4^k.
-For BDF2 steps must depend on the state and not on the way there: its leading error cancels over a reversible motion,
-such as a body that tumbles, but not if steps grow late and shrink at once. Radau IIA has a rule of its own (radau5.py).
+is that of Hairer and Wanner 1996, IV.8), and left alone when it would grow by less than a fifth: an unchanged step
+keeps the factorised matrix good. Where all coordinates are of second order, BDF2 takes the next smaller size of a grid,
+1.4^k, instead. There motions may be reversible, as that of a body that tumbles, and BDF2's leading error then cancels
+if steps depend on the state and not on the way there, but not if they grow late and shrink at once. Radau IIA has a
+rule of its own (radau5.py).
 """
 
 import math
 from typing import NamedTuple
 
-from dms_core.assembly.tables import SIGNALS, WORK
-from dms_core.compiled.arena import fields, floats, inner, ints
+from dms_core.assembly.tables import MODEL, SIGNALS, WORK
+from dms_core.compiled.arena import fields, flags, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.bdf2 import bdf2_step
 from dms_core.simulation.implicit_stage import set_weights
@@ -39,9 +40,9 @@ OUTCOME = fields(Outcome)
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
-"""Growth up to which SDIRK2 throughout leaves its step alone."""
+"""Growth up to which a step is left alone."""
 GRID, GRID_SAFETY = math.log(1.4), 0.99
-"""Logarithm of the ratio of neighbouring sizes of BDF2's steps; on average they are a sixth below what is allowed."""
+"""Logarithm of the ratio of neighbouring sizes on the grid; on average a step is a sixth below what is allowed."""
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
 NEAR = 32
@@ -163,17 +164,27 @@ def growth(error, iterations, safety):
 
 @compiled
 def resize(h, error, iterations):
-    """The next step size of SDIRK2 throughout."""
+    """The next step size, h where it would hardly grow."""
     factor = growth(error, iterations, SAFETY)
     return h if 1.0 <= factor < DEAD_ZONE else h * factor
 
 
 @compiled
-def size_behind(s, o, h, error, iterations):
+def all_of_second_order(m):
+    """Whether no coordinate that is solved for is of first order."""
+    second = flags(m, MODEL.second)
+    for i in naturals(m, MODEL.free):
+        if not second[i]:
+            return False
+    return True
+
+
+@compiled
+def size_behind(m, s, o, h, error, iterations):
     """Size that the step behind an accepted one should have."""
     if o.method == METHOD.radau5:
         return floats(inner(s, STATE.radau), RADAU.control)[CONTROL.wanted]
-    if o.method == METHOD.bdf2:
+    if o.method == METHOD.bdf2 and all_of_second_order(m):
         # A size that is on the grid but for rounding stays.
         place = math.log(h * growth(error, iterations, GRID_SAFETY)) / GRID
         return math.exp(GRID * math.floor(place + 1e-9))
@@ -242,7 +253,7 @@ def one_step(m, s, o, stop, kept):
             )
             clock[CLOCK.worst] = 0.0
     elif not fixed:
-        size = size_behind(s, o, h, error, iterations)
+        size = size_behind(m, s, o, h, error, iterations)
         # A step cut short by a landing says little about the size that the motion allows.
         clock[CLOCK.h_wanted] = max(size, wanted) if h < wanted and first_try else size
     return OUTCOME.done
