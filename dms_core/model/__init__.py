@@ -21,6 +21,7 @@ from dms_core.model.constraints import (
 )
 from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
+from dms_core.model.flexible import Beam, BeamElement, BeamLoad, BeamSection
 from dms_core.model.forces import (
     FirstOrder,
     Gravity,
@@ -41,6 +42,10 @@ from dms_core.model.system import System
 __all__ = [
     "GROUND",
     "AngleDriver",
+    "Beam",
+    "BeamElement",
+    "BeamLoad",
+    "BeamSection",
     "Constant",
     "CoordinateSensor",
     "DelayedError",

@@ -259,6 +259,22 @@ class Constraint(Declaration):
         raise NotImplementedError
 
 
+class Parts(NamedTuple):
+    """What a composition stands for."""
+
+    bodies: tuple[Body, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    forces: tuple[Force, ...] = ()
+
+
+class Composition(Declaration):
+    """A declaration that stands for several others, whose names begin with its own and a dot."""
+
+    def parts(self) -> Parts:
+        """The declarations it stands for; the same ones each time."""
+        raise NotImplementedError
+
+
 class Sensor(Declaration):
     """Measured quantities y = h(q, v, vdot, lam, u)."""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dms_core.errors import ModelError, choices
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.element import GROUND, Body, Constraint, Declaration, Force, Sensor
+from dms_core.model.element import GROUND, Body, Composition, Constraint, Declaration, Force, Parts, Sensor
 from dms_core.model.geometry.frames import rotation_matrix
 from dms_core.model.signals import Input
 
@@ -19,6 +19,7 @@ class System:
 
     Args:
         name: shown in reports.
+        compositions: declarations that stand for several bodies, constraints and forces each, which come first.
         bodies, constraints, forces, sensors, inputs: declarations; every name is used once.
 
     Raises:
@@ -29,6 +30,7 @@ class System:
         self,
         name: str = "system",
         *,
+        compositions: tuple[Composition, ...] | list[Composition] = (),
         bodies: tuple[Body, ...] | list[Body] = (),
         constraints: tuple[Constraint, ...] | list[Constraint] = (),
         forces: tuple[Force, ...] | list[Force] = (),
@@ -38,16 +40,21 @@ class System:
         from dms_core.model.constraints.euler_norm import EulerNorm
 
         self.name = name
-        self.bodies = self._checked("bodies", bodies, Body)
+        self.compositions = self._checked("compositions", compositions, Composition)
+        made = {composition.name: composition.parts() for composition in self.compositions}
+        parts = Parts(*(sum((p[k] for p in made.values()), ()) for k in range(len(Parts._fields))))
+        self.composed = {part.name: name for name, p in made.items() for of_a_kind in p for part in of_a_kind}
+        """Name of each part of a composition, and that of the composition."""
+        self.bodies = parts.bodies + self._checked("bodies", bodies, Body)
         norms = tuple(EulerNorm(name=f"{b.name}.euler_norm", body=b.name) for b in self.bodies if b.rigid)
         # Those of another system may be among the constraints that were taken over from it.
         declared = tuple(c for c in self._checked("constraints", constraints, Constraint) if c not in norms)
-        self.constraints = norms + declared
-        self.forces = self._checked("forces", forces, Force)
+        self.constraints = norms + parts.constraints + declared
+        self.forces = parts.forces + self._checked("forces", forces, Force)
         self.sensors = self._checked("sensors", sensors, Sensor)
         self.inputs = self._checked("inputs", inputs, Input)
         self._by_name: dict[str, Declaration] = {}
-        for element in self.everything():
+        for element in (*self.compositions, *self.everything()):
             if element.name == GROUND:
                 raise ModelError("the name 'ground' is reserved for the fixed frame; choose another name.")
             if element.name in self._by_name:
@@ -56,6 +63,12 @@ class System:
                     f"the name '{element.name}' is used by a {first.kind} and a {element.kind}; names must be unique."
                 )
             self._by_name[element.name] = element
+
+    def own(self, section: str) -> tuple[Declaration, ...]:
+        """What was declared in a list ("bodies", ...): without unit-norm equations and parts of compositions."""
+        from dms_core.model.constraints.euler_norm import EulerNorm
+
+        return tuple(e for e in getattr(self, section) if not isinstance(e, EulerNorm) and e.name not in self.composed)
 
     @staticmethod
     def _checked(what: str, items: Any, kind: type) -> tuple:

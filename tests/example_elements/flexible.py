@@ -1,0 +1,55 @@
+"""Examples of flexible bodies."""
+
+from __future__ import annotations
+
+from dms_core.model.bodies import RigidBody
+from dms_core.model.flexible import BeamElement, BeamLoad, BeamSection
+from dms_core.model.geometry.frames import quaternion
+from dms_core.model.system import System
+from tests.example_elements import Example
+
+SECTION = BeamSection(
+    youngs_modulus=30.0, shear_modulus=13.0, area=0.7, inertia_y=0.3, inertia_z=0.2, torsion_constant=0.25,
+    shear_factor_y=0.8, density=2.0,
+)  # fmt: skip
+"""Soft, so that no part of the force is lost beside the others."""
+
+
+def _node(name: str, position, orientation) -> RigidBody:
+    return RigidBody(name=name, mass=1.0, inertia=(0.2, 0.1, 0.1), position=position, orientation=tuple(orientation))
+
+
+def _beam(sensor: bool = False, **settings) -> Example:
+    nodes = [
+        _node("one", (0.1, 0.2, -0.1), quaternion((0.3, 0.2, 0.5), 0.4)),
+        _node("two", (0.72, 0.51, -0.18), quaternion((0.3, 0.1, 0.6), 0.6)),
+    ]
+    beam = BeamElement(name="beam", body_i="one", body_j="two", section=SECTION, **settings)
+    gauge = BeamLoad(name="gauge", element="beam")
+    return Example(System(bodies=nodes, forces=[beam], sensors=[gauge]), gauge if sensor else beam)
+
+
+def beam() -> Example:
+    """At rest where it starts, lumped mass."""
+    return _beam()
+
+
+def damped_beam() -> Example:
+    """With every number of its own."""
+    return _beam(
+        length=0.7, rest_strain=(0.01, 0.02, -0.01), rest_curvature=(0.2, -0.3, 0.1), damping_time=0.4,
+        mass="consistent",
+    )  # fmt: skip
+
+
+def gauge() -> Example:
+    """Without damping."""
+    return _beam(sensor=True)
+
+
+def damped_gauge() -> Example:
+    """With damping, whose rates the loads depend on."""
+    return _beam(sensor=True, damping_time=0.4)
+
+
+EXAMPLES = {"beam_element": (beam, damped_beam), "beam_load": (gauge, damped_gauge)}
