@@ -21,7 +21,7 @@ from dms_core.model.constraints import (
 )
 from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
-from dms_core.model.flexible import Beam, BeamElement, BeamLoad, BeamSection
+from dms_core.model.flexible import Beam, BeamElement, BeamLoad, BeamSection, DistributedLoad
 from dms_core.model.forces import (
     FirstOrder,
     Gravity,
@@ -50,6 +50,7 @@ __all__ = [
     "CoordinateSensor",
     "DelayedError",
     "Distance",
+    "DistributedLoad",
     "EulerNorm",
     "FirstOrder",
     "Fixed",

@@ -54,7 +54,7 @@ class System:
         self.sensors = self._checked("sensors", sensors, Sensor)
         self.inputs = self._checked("inputs", inputs, Input)
         self._by_name: dict[str, Declaration] = {}
-        for element in (*self.compositions, *self.everything()):
+        for element in self.everything():
             if element.name == GROUND:
                 raise ModelError("the name 'ground' is reserved for the fixed frame; choose another name.")
             if element.name in self._by_name:
@@ -78,8 +78,8 @@ class System:
         return tuple(items)
 
     def everything(self) -> Iterator[Declaration]:
-        """All declarations, in the order bodies, constraints, forces, sensors, inputs."""
-        yield from (*self.bodies, *self.constraints, *self.forces, *self.sensors, *self.inputs)
+        """All declarations, in the order compositions, bodies, constraints, forces, sensors, inputs."""
+        yield from (*self.compositions, *self.bodies, *self.constraints, *self.forces, *self.sensors, *self.inputs)
 
     def element(self, name: str, kind: type | None = None) -> Any:
         """The declaration of that name; an unknown name or a wrong kind is an error that lists the right ones."""

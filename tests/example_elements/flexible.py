@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dms_core.model.bodies import RigidBody
-from dms_core.model.flexible import BeamElement, BeamLoad, BeamSection
+from dms_core.model.flexible import Beam, BeamElement, BeamLoad, BeamSection, DistributedLoad
 from dms_core.model.geometry.frames import quaternion
+from dms_core.model.signals import Input
 from dms_core.model.system import System
 from tests.example_elements import Example
+from tests.example_elements.pair import pair
 
 SECTION = BeamSection(
     youngs_modulus=30.0, shear_modulus=13.0, area=0.7, inertia_y=0.3, inertia_z=0.2, torsion_constant=0.25,
@@ -52,4 +54,24 @@ def damped_gauge() -> Example:
     return _beam(sensor=True, damping_time=0.4)
 
 
-EXAMPLES = {"beam_element": (beam, damped_beam), "beam_load": (gauge, damped_gauge)}
+def load_on_beam() -> Example:
+    """Fixed, growing along a beam, scaled by an input."""
+    beam = Beam(name="boom", section=SECTION, length=1.0, elements=2)
+    load = DistributedLoad(name="load", body="boom", per_length=(0.3, -2.0, 1.0), end_factor=3.0, input="pull")
+    return Example(System(compositions=[beam], forces=[load], inputs=[Input(name="pull")]), load)
+
+
+def load_on_line() -> Example:
+    """Following, on a line of a rigid body, scaled by an input."""
+    load = DistributedLoad(
+        name="load", body="lower", per_length=(3.0, -2.0, 1.0), end_factor=0.5, start=(0.1, 0.0, 0.2),
+        end=(0.1, 0.4, 0.3), axes="body", input="pull",
+    )  # fmt: skip
+    return Example(pair(forces=[load], inputs=["pull"]), load)
+
+
+EXAMPLES = {
+    "beam_element": (beam, damped_beam),
+    "beam_load": (gauge, damped_gauge),
+    "distributed_load": (load_on_beam, load_on_line),
+}

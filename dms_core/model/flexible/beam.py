@@ -58,7 +58,7 @@ class Beam(Composition):
         default=0.0, ge=0.0, description="tau [s]: section loads are stiffness times (strain + tau strain rate)"
     )
     mass: Literal["lumped", "consistent"] = Field(
-        default="lumped", description="of the nodes alone, or that of linearly interpolated positions between them"
+        default="consistent", description="at the nodes alone, or that of the cubic between them, which is more exact"
     )
 
     def node(self, k: int) -> str:

@@ -15,8 +15,7 @@ back into the shear stiffness (R. H. MacNeal (1978), Comput. Struct. 8:175-183, 
 
 so that there is no locking, and a straight beam loaded at its nodes is exact there as long as deflections are small.
 
-The mass of the beam is that of its nodes, which are rigid bodies; `coupling` = rho A L / 6 turns their lumped mass into
-the consistent one of linearly interpolated positions:  M_r = coupling (1 -1; -1 1) is taken off.
+The mass of the beam is that of its nodes, which are rigid bodies; beam_mass.py turns it into the consistent one.
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.flexible import strains as strain
+from dms_core.model.flexible.beam_mass import add_beam_mass
 from dms_core.model.flexible.section import BeamSection
 from dms_core.model.geometry.rotations import add, dot, euler_parameters, sub, vec
 from dms_core.model.places import numbers_at
@@ -51,7 +51,9 @@ class BeamNumbers(NamedTuple):
     rest_turn: int = 9
     """theta at rest [rad]."""
     damping_time: int = 12
-    coupling: int = 13
+    length: int = 13
+    mass_share: int = 14
+    """rho A L / 420 of a consistent mass [kg], 0 for a lumped one."""
 
 
 BEAM = BeamNumbers()
@@ -225,20 +227,6 @@ def _turn_derivatives(par, q, v, M, Jq, Jv):
 
 
 @compiled
-def _couple(coupling, a, level, r, Ja):
-    """What the consistent mass takes off the lumped one."""
-    for i in range(3):
-        force = coupling * (a[7 + i] - a[i])
-        r[i] += force
-        r[7 + i] -= force
-        if level > 0:
-            Ja[i, i] -= coupling
-            Ja[7 + i, 7 + i] -= coupling
-            Ja[i, 7 + i] += coupling
-            Ja[7 + i, i] += coupling
-
-
-@compiled
 def beam_element(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """Rows g_q^T N + theta_q^T M; ip: none."""
     N, M = beam_forces(par, q, v)
@@ -257,8 +245,8 @@ def beam_element(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     if level > 0:
         _stretch_derivatives(par, q, v, N, Jq, Jv)
         _turn_derivatives(par, q, v, M, Jq, Jv)
-    if par[BEAM.coupling] > 0.0:
-        _couple(par[BEAM.coupling], a, level, r, Ja)
+    if par[BEAM.mass_share] > 0.0:
+        add_beam_mass(par[BEAM.mass_share], par[BEAM.length], q, v, a, level, r, Jq, Jv, Ja)
 
 
 class BeamElement(Force):
@@ -290,7 +278,7 @@ class BeamElement(Force):
     )
     mass: Literal["lumped", "consistent"] = Field(
         default="lumped",
-        description="'lumped': the bodies' own; 'consistent': positions between them are interpolated linearly",
+        description="that of the nodes alone, or made that of the cubic between them; nodes have half of it each",
     )
 
     def place(self, system) -> Placement:
@@ -300,17 +288,20 @@ class BeamElement(Force):
         rest = g if self.rest_strain is None else length * (np.array(self.rest_strain) + AXES[0])
         turn = theta if self.rest_curvature is None else length * np.array(self.rest_curvature)
         stretching, turning = self.section.stiffnesses(length)
-        coupling = self.section.mass_per_length * length / 6.0 if self.mass == "consistent" else 0.0
+        consistent, damped = self.mass == "consistent", self.damping_time > 0.0
+        mass_share = self.section.mass_per_length * length / 420.0 if consistent else 0.0
         numbers = numbers_at(
             BEAM, stretching=stretching / length, turning=turning / length, rest_stretch=rest, rest_turn=turn,
-            damping_time=self.damping_time, coupling=coupling,
+            damping_time=self.damping_time, length=length, mass_share=mass_share,
         )  # fmt: skip
         full, none = np.ones((14, 14), bool), np.zeros((14, 14), bool)
-        moved = np.tile(np.diag(np.arange(7) < 3), (2, 2))
+        turned = np.tile(np.arange(7) >= 3, 2)
+        apart = turned[:, None] | turned | np.tile(np.eye(7, dtype=bool), (2, 2))
+        by_rates = full if damped else np.tile(turned, (14, 1)) if consistent else none
         return Placement(
             bodies=(self.body_i, self.body_j),
             numbers=numbers,
-            pattern=Pattern(full, full if self.damping_time > 0.0 else none, moved if coupling > 0.0 else none),
+            pattern=Pattern(full, by_rates, apart if consistent else none),
         )
 
     def _start(self, system) -> tuple[np.ndarray, np.ndarray]:
