@@ -101,6 +101,17 @@ class System:
             raise ModelError(f"body '{name}' does not exist. Declared: {choices(names)}.")
         return self._by_name[name]  # type: ignore[return-value]
 
+    def mass_moments(self) -> dict[str, np.ndarray]:
+        """First moments of mass about r of the bodies that have any [kg m], see DynamicElement.mass_moments."""
+        total: dict[str, np.ndarray] = {}
+        for element in (*self.bodies, *self.forces):
+            for body, moment in element.mass_moments(self).items():
+                before = total.get(body, np.zeros((0, 3)))
+                total[body] = np.zeros((max(len(before), len(moment)), 3))
+                for part in (before, moment):
+                    total[body][: len(part)] += part
+        return {body: moment for body, moment in total.items() if np.any(moment)}
+
     def arm(self, body: str, point) -> np.ndarray:
         """A point of a body's reference frame, seen from its centre of mass [m], shape (3,)."""
         found = self.body(body)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dms_core.model.element import Force
+from dms_core.model.flexible import Beam, BeamSection
 from dms_core.model.forces import (
     FirstOrder,
     Gravity,
@@ -12,6 +13,7 @@ from dms_core.model.forces import (
     SecondOrder,
     SpringDamper,
 )
+from dms_core.model.system import System
 from tests.example_elements import Example
 from tests.example_elements.constraints import HINGE
 from tests.example_elements.pair import pair
@@ -27,6 +29,16 @@ def _force(element: Force, *inputs: str) -> Example:
 def gravity() -> Example:
     """All three bodies, gravity along no axis."""
     return _force(Gravity(name="weight_of_all", acceleration=(1.0, -9.0, 2.0)))
+
+
+def weight_of_beam() -> Example:
+    """Nodes about which the beam's mass has a moment."""
+    section = BeamSection(
+        youngs_modulus=1.0, shear_modulus=1.0, area=0.5, inertia_y=0.1, inertia_z=0.1, torsion_constant=0.1, density=3.0
+    )
+    beam = Beam(name="boom", section=section, length=1.0, elements=1)
+    element = Gravity(name="weight", acceleration=(1.0, -9.0, 2.0))
+    return Example(System(compositions=[beam], forces=[element]), element)
 
 
 def load() -> Example:
@@ -95,7 +107,10 @@ def free_oscillator() -> Example:
 
 
 EXAMPLES = {
-    "gravity": (gravity,),
+    "gravity": (
+        gravity,
+        weight_of_beam,
+    ),
     "lumped_load": (load, following_load, pure_moment),
     "spring_damper": (spring, undamped_spring),
     "joint_spring_damper": (joint_spring, joint_spring_without_damping),

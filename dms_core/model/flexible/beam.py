@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.element import Composition, Parts, Quaternion, Vector
@@ -60,6 +60,18 @@ class Beam(Composition):
     mass: Literal["lumped", "consistent"] = Field(
         default="consistent", description="at the nodes alone, or that of the cubic between them, which is more exact"
     )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if not np.linalg.norm(self.orientation) > 1e-6:
+            raise ValueError(f"orientation = {self.orientation}: Expected Euler parameters of a length above 0")
+        turn = float(np.linalg.norm(self.curvature)) * self.element_length
+        if turn >= np.pi:
+            raise ValueError(
+                f"curvature = {self.curvature}: an element turns by {np.degrees(turn):.0f} degrees: Expected less than "
+                "180, with more elements or less curvature"
+            )
+        return self
 
     def node(self, k: int) -> str:
         """Name of node k, from 0; negative numbers count from the end."""

@@ -25,10 +25,10 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
+import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.flexible import strains as strain
 from dms_core.model.flexible.beam_mass import add_beam_mass
 from dms_core.model.flexible.section import BeamSection
 from dms_core.model.geometry.rotations import add, dot, euler_parameters, sub, vec
@@ -281,6 +281,14 @@ class BeamElement(Force):
         description="that of the nodes alone, or made that of the cubic between them; nodes have half of it each",
     )
 
+    def mass_moments(self, system) -> dict[str, np.ndarray]:
+        """That of a consistent mass, rho A L^2 / 12 ahead of the first node and behind the second."""
+        if self.mass == "lumped":
+            return {}
+        length = float(np.linalg.norm(self._start(system)[0])) if self.length is None else self.length
+        moment = np.array([[self.section.mass_per_length * length**2 / 12.0, 0.0, 0.0]])
+        return {self.body_i: moment, self.body_j: -moment}
+
     def place(self, system) -> Placement:
         """Both bodies; stiffnesses over the length, and the state of rest."""
         g, theta = self._start(system)
@@ -326,6 +334,8 @@ class BeamElement(Force):
         c = strain.product(strain.conjugate(p), s)
         g, theta = np.array(strain.stretch(m, d)), np.array(strain.turn(c, strain.turn_factors(c)))
         distance = float(np.linalg.norm(g))
+        if self.body_i == self.body_j:
+            raise ModelError(f"{who}: Expected two different bodies, got '{self.body_i}' twice.")
         if distance < 1e-9:
             raise ModelError(f"{who}: '{self.body_i}' and '{self.body_j}' start at the same place.")
         if np.hypot(g[1], g[2]) > ASKEW * distance or g[0] < 0.0:

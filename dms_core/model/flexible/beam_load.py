@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from pydantic import Field
 
+import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
-from dms_core.model.flexible import strains as strain
 from dms_core.model.flexible.beam_element import (
     AXES,
     BEAM,

@@ -10,8 +10,11 @@ from dms_core.assembly.layout import Layout
 from dms_core.assembly.model import Model
 from dms_core.model import (
     AngleDriver,
+    BeamElement,
+    BeamSection,
     Constant,
     Distance,
+    DistributedLoad,
     FirstOrder,
     Fixed,
     Gravity,
@@ -109,6 +112,31 @@ FORCES: tuple[DynamicElement, ...] = (
     ),
     JointSpringDamper(name="stop", joint="elbow", stiffness=8.0, damping=0.7),
     JointStop(name="end", joint="elbow", lowest=1.0, highest=1.1, stiffness=5.0, dissipation=0.05),
+    BeamElement(
+        name="strut",
+        body_i="lift",
+        body_j="wheel",
+        damping_time=0.02,
+        mass="consistent",
+        rest_curvature=(0.1, 0.2, 0.3),
+        section=BeamSection(
+            youngs_modulus=3e3,
+            shear_modulus=1e3,
+            area=2e-2,
+            inertia_y=3e-2,
+            inertia_z=2e-2,
+            torsion_constant=4e-2,
+            density=5.0,
+        ),
+    ),
+    DistributedLoad(
+        name="wind",
+        body="weight",
+        per_length=(3.0, 0.0, 5.0),
+        start=(0.0, -0.1, 0.1),
+        end=(0.1, 0.1, 0.0),
+        input="factor",
+    ),
     FirstOrder(name="lag", time_constant=0.1, gain=2.0, input="factor", start=0.4),
     SecondOrder(name="oscillator", mass=2.0, damping=0.3, stiffness=40.0, input="factor", start=0.2, start_rate=0.5),
     RopeForce(

@@ -25,7 +25,7 @@ from tests.dms_core.model.flexible.beams import cantilever, momenta, strain_ener
 from tests.dms_core.model.flexible.equilibrium import at_rest, frequencies
 
 SOFT = BeamSection(
-    youngs_modulus=2e5, shear_modulus=8e4, area=4e-3, inertia_y=2e-6, inertia_z=1e-6, torsion_constant=2e-6,
+    youngs_modulus=4e4, shear_modulus=1.6e4, area=4e-3, inertia_y=2e-6, inertia_z=1e-6, torsion_constant=2e-6,
     density=1000.0,
 )  # fmt: skip
 """Of rubber, 60 mm wide: the motion bends it by the size of itself and asks for steps of a millisecond."""
@@ -43,16 +43,17 @@ def test_a_free_beam_keeps_energy_and_momenta(mass):
     elastic = np.array([strain_energy(model, q) for q in run.q[::20]])
     kept = [momenta(model, q, v) for q, v in zip(run.q[::20], run.v[::20], strict=True)]
     kinetic, linear, angular = (np.array(x) for x in zip(*kept, strict=True))
-    assert elastic.max() > 0.03 * kinetic[0]
-    # Errors of 1e-8 a step in positions of 1 m, forces of EA = 800 N: seen 3e-6 of the energy.
+    assert elastic.max() > 0.02 * kinetic[0]
+    # Errors of 1e-8 a step in positions of 1 m, forces of EA = 160 N: seen 3e-6 of the energy.
     np.testing.assert_allclose(kinetic + elastic, kinetic[0], rtol=3e-5)
     np.testing.assert_allclose(linear, linear[[0]].repeat(len(linear), 0), atol=1e-6 * np.abs(linear[0]).max())
     np.testing.assert_allclose(angular, angular[[0]].repeat(len(angular), 0), atol=1e-5 * np.abs(angular[0]).max())
 
 
-def test_a_falling_beam_stays_straight():
-    """Gravity on all nodes: no strain, and the acceleration of free fall."""
-    beam = Beam(name="bow", section=SOFT, length=1.0, elements=3, curvature=(0.0, 0.0, 1.0))
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_a_falling_beam_feels_nothing(mass):
+    """Weight and inertia are of the same mass: no strain, and the acceleration of free fall."""
+    beam = Beam(name="bow", section=SOFT, length=1.0, elements=3, curvature=(0.0, 0.0, 1.0), mass=mass)
     model = Model(System("fall", compositions=[beam], forces=[Gravity(name="weight")]))
     run = simulate(model, 0.5).check()
     assert strain_energy(model, run.q[-1]) < 1e-12
