@@ -21,7 +21,21 @@ from dms_core.model.constraints import (
 )
 from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
-from dms_core.model.flexible import Beam, BeamElement, BeamLoad, BeamSection, DistributedLoad
+from dms_core.model.flexible import (
+    Beam,
+    BeamElement,
+    BeamLoad,
+    BeamSection,
+    DistributedLoad,
+    FloatingFrame,
+    Interface,
+    InterfaceFrame,
+    ModalBody,
+    ModalData,
+    ModalNode,
+    craig_bampton,
+    orthogonal,
+)
 from dms_core.model.forces import (
     FirstOrder,
     Gravity,
@@ -54,12 +68,15 @@ __all__ = [
     "EulerNorm",
     "FirstOrder",
     "Fixed",
+    "FloatingFrame",
     "Function",
     "Gravity",
     "Harmonic",
     "ImpedanceController",
     "Imu",
     "Input",
+    "Interface",
+    "InterfaceFrame",
     "JointAngle",
     "JointMoment",
     "JointReaction",
@@ -69,6 +86,9 @@ __all__ = [
     "Lines",
     "LumpedLoad",
     "MinimumJerk",
+    "ModalBody",
+    "ModalData",
+    "ModalNode",
     "MuscleSensor",
     "PathPoint",
     "Pid",
@@ -93,4 +113,6 @@ __all__ = [
     "ThelenCurves",
     "ThelenMuscle",
     "Tracking",
+    "craig_bampton",
+    "orthogonal",
 ]

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import ModelError, choices
-from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.element import GROUND, Body, Composition, Constraint, Declaration, Force, Parts, Sensor
 from dms_core.model.geometry.frames import rotation_matrix
 from dms_core.model.signals import Input
@@ -115,7 +114,7 @@ class System:
     def arm(self, body: str, point) -> np.ndarray:
         """A point of a body's reference frame, seen from its centre of mass [m], shape (3,)."""
         found = self.body(body)
-        centre = found.centre_of_mass if isinstance(found, RigidBody) else (0.0, 0.0, 0.0)
+        centre = getattr(found, "centre_of_mass", (0.0, 0.0, 0.0))
         return np.asarray(point, float) - np.asarray(centre, float)
 
     def start_pose(self, body: str) -> tuple[np.ndarray, np.ndarray]:
@@ -123,7 +122,7 @@ class System:
         found = self.body(body)
         if found is None:
             return np.zeros(3), np.eye(3)
-        rotation = rotation_matrix(found.orientation) if isinstance(found, RigidBody) else np.eye(3)
+        rotation = rotation_matrix(found.orientation) if found.rigid else np.eye(3)  # type: ignore[attr-defined]
         return np.asarray(found.position, float), rotation  # type: ignore[attr-defined]
 
     def start_point(self, body_i: str, point, body_j: str) -> np.ndarray:

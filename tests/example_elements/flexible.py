@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from dms_core.model.bodies import RigidBody
-from dms_core.model.flexible import Beam, BeamElement, BeamLoad, BeamSection, DistributedLoad
+from dms_core.model.flexible import (
+    Beam,
+    BeamElement,
+    BeamLoad,
+    BeamSection,
+    DistributedLoad,
+    Interface,
+    ModalBody,
+    ModalData,
+)
 from dms_core.model.geometry.frames import quaternion
 from dms_core.model.signals import Input
 from dms_core.model.system import System
@@ -70,8 +81,68 @@ def load_on_line() -> Example:
     return Example(pair(forces=[load], inputs=["pull"]), load)
 
 
+def _random(rng: np.random.Generator, *shape: int) -> tuple:
+    """Random numbers as nested tuples."""
+    x = rng.uniform(-1.0, 1.0, shape)
+    return tuple(map(float, x)) if len(shape) == 1 else tuple(_random(rng, *shape[1:]) for _ in range(shape[0]))
+
+
+def modal_data(n: int = 3) -> ModalData:
+    """Invariants of no body in particular: every coefficient counts."""
+    rng = np.random.default_rng(1)
+    curvature = np.array(_random(rng, n, n, 6))
+    symmetric = curvature + curvature.swapaxes(0, 1)
+    return ModalData(
+        mass=2.0, mass_moment=_random(rng, 3), inertia=_random(rng, 6), modal_mass=tuple(1.0 + 0.5 * np.arange(n)),
+        modal_stiffness=tuple(3.0 + 2.0 * np.arange(n)), translation=_random(rng, n, 3), rotation=_random(rng, n, 3),
+        inertia_rate=_random(rng, n, 6), rotation_rate=_random(rng, n, n, 3),
+        inertia_curvature=tuple(tuple(map(tuple, row)) for row in symmetric),
+    )  # fmt: skip
+
+
+def modal_system(**more) -> System:
+    """A modal body with one interface."""
+    rng, data = np.random.default_rng(2), modal_data()
+    tip = Interface(name="tip", point=(0.4, 0.1, -0.2), translations=_random(rng, 3, 3), rotations=_random(rng, 3, 3))
+    body = ModalBody(name="link", data=data, interfaces=(tip,), damping_ratio=0.2)
+    return System(compositions=[body], **more)
+
+
+def frame() -> Example:
+    """Three modes, damped."""
+    system = modal_system()
+    return Example(system, system.element("link.frame"))
+
+
+def interface() -> Example:
+    """Without any rows."""
+    system = modal_system()
+    return Example(system, system.element("link.tip"))
+
+
+def node() -> Example:
+    """Three modes that displace and turn it."""
+    system = modal_system()
+    return Example(system, system.element("link.tip_node"))
+
+
+def load_on_modes() -> Example:
+    """Per mass, following, scaled by an input."""
+    load = DistributedLoad(name="load", body="link", per_mass=(0.3, -2.0, 1.0), axes="body", input="pull")
+    return Example(modal_system(forces=[load], inputs=[Input(name="pull")]), load)
+
+
+def weight_on_modes() -> Example:
+    """Per mass, fixed."""
+    load = DistributedLoad(name="load", body="link", per_mass=(0.3, -2.0, 1.0))
+    return Example(modal_system(forces=[load]), load)
+
+
 EXAMPLES = {
+    "floating_frame": (frame,),
+    "interface_frame": (interface,),
+    "modal_node": (node,),
     "beam_element": (beam, damped_beam),
     "beam_load": (gauge, damped_gauge),
-    "distributed_load": (load_on_beam, load_on_line),
+    "distributed_load": (load_on_beam, load_on_line, load_on_modes, weight_on_modes),
 }

@@ -16,6 +16,7 @@ from dms_core.model.forces import (
 from dms_core.model.system import System
 from tests.example_elements import Example
 from tests.example_elements.constraints import HINGE
+from tests.example_elements.flexible import modal_system
 from tests.example_elements.pair import pair
 
 LOAD = {"body": "lower", "point": (0.03, -0.1, 0.05), "force": (3.0, -20.0, 5.0), "moment": (0.4, -0.6, 2.0)}
@@ -39,6 +40,12 @@ def weight_of_beam() -> Example:
     beam = Beam(name="boom", section=section, length=1.0, elements=1)
     element = Gravity(name="weight", acceleration=(1.0, -9.0, 2.0))
     return Example(System(compositions=[beam], forces=[element]), element)
+
+
+def weight_of_modes() -> Example:
+    """A floating frame, whose modes move its mass."""
+    element = Gravity(name="weight", acceleration=(1.0, -9.0, 2.0))
+    return Example(modal_system(forces=[element]), element)
 
 
 def load() -> Example:
@@ -110,6 +117,7 @@ EXAMPLES = {
     "gravity": (
         gravity,
         weight_of_beam,
+        weight_of_modes,
     ),
     "lumped_load": (load, following_load, pure_moment),
     "spring_damper": (spring, undamped_spring),

@@ -15,32 +15,82 @@ of L q_b / 2 at (a + 2 b) / 3. A load that follows turns with the section that i
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.flexible.beam import Beam
+from dms_core.model.flexible.modal_body import ModalBody
+from dms_core.model.forces.gravity import moment_pattern
 from dms_core.model.forces.lumped_load import LOAD, lumped_load, lumped_load_by_input
+from dms_core.model.forces.mass_moment import add_following, add_moment_load
+from dms_core.model.geometry.rotations import columns, rotated, scale, vec
 from dms_core.model.places import numbers_at
 
 ORIGIN = (0.0, 0.0, 0.0)
 
 
+class SpreadNumbers(NamedTuple):
+    """Places of the kernel's numbers on a modal body; those of a point force are LoadNumbers."""
+
+    mass: int = 0
+    load: int = 1
+    """Per mass."""
+    moment: int = 4
+    """c_0, then the columns of P."""
+
+
+SPREAD = SpreadNumbers()
+
+
+@compiled
+def distributed_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
+    """ip: load in body axes, load scaled by the input, number of modes (-1: a point force)."""
+    if ip[2] < 0:
+        lumped_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja)
+        return
+    factor = u[0, 0] if ip[1] == 1 else 1.0
+    own = scale(factor, vec(par, SPREAD.load))
+    g = rotated(q, 0, own) if ip[0] == 1 else own
+    for i in range(3):
+        r[i] -= par[SPREAD.mass] * g[i]
+    add_moment_load(par, SPREAD.moment, ip[2], g, q, level, r, Jq)
+    if level > 0 and ip[0] == 1:
+        turning = columns(q, 0, own)
+        for i in range(3):
+            for k in range(4):
+                Jq[i, 3 + k] -= par[SPREAD.mass] * turning[k][i]
+        add_following(par, SPREAD.moment, ip[2], own, q, Jq)
+
+
+@compiled(makes_arrays=True)
+def distributed_load_by_input(ip, par, q, v, a, u, Ju):
+    """The rows by the factor: those of the factor 1."""
+    if ip[2] < 0:
+        lumped_load_by_input(ip, par, q, v, a, u, Ju)
+        return
+    one, rows, unused = np.ones((1, 3)), np.zeros(7 + ip[2]), np.zeros((1, 1))
+    distributed_load(ip, par, q, v, a, one, 0, rows, unused, unused, unused)
+    for i in range(7 + ip[2]):
+        Ju[i, 0, 0] = rows[i]
+
+
 class DistributedLoad(Force):
     """Load per length, volume or mass, fixed in direction or following the body, constant or multiplied by an input.
 
-    It lies on all of a beam, or on the line from `start` to `end` of a rigid body, where its resultant acts. Weight by
-    `per_mass` replaces that of a `gravity` for this body; do not declare both.
+    It lies on all of a beam, on all mass of a modal body, or on the line from `start` to `end` of a rigid body, where
+    its resultant acts. Weight by `per_mass` replaces that of a `gravity` for this body; do not declare both.
     """
 
     kind: ClassVar[str] = "distributed_load"
-    kernel: ClassVar = lumped_load
-    input_kernel: ClassVar = lumped_load_by_input
-    body: str = Field(description="beam, or rigid body")
+    kernel: ClassVar = distributed_load
+    input_kernel: ClassVar = distributed_load_by_input
+    body: str = Field(description="beam, modal body, or rigid body")
     per_length: Vector | None = Field(default=None, description="load per length [N/m]")
     per_volume: Vector | None = Field(default=None, description="load per volume, of a beam [N/m^3]")
     per_mass: Vector | None = Field(default=None, description="load per mass, such as gravity [N/kg]")
@@ -68,15 +118,18 @@ class DistributedLoad(Force):
         return () if self.input is None else (self.input,)
 
     def placements(self, system) -> tuple[Placement, ...]:
-        """One call for each point force."""
+        """One call for each point force, one for a modal body."""
         found = system.element(self.body)
+        if isinstance(found, ModalBody):
+            return (self._on_modal_body(found),)
         if isinstance(found, Beam):
             points = self._on_beam(found)
         elif isinstance(found, RigidBody):
             points = self._on_rigid_body(found)
         else:
             raise ModelError(
-                f"distributed_load '{self.name}': Expected a beam or a rigid body, got the {found.kind} '{self.body}'."
+                f"distributed_load '{self.name}': Expected a beam, a modal body or a rigid body, got the {found.kind} "
+                f"'{self.body}'."
             )
         return tuple(
             self._placement(body, system.arm(body, point), force) for body, point, force in points if np.any(force)
@@ -118,6 +171,26 @@ class DistributedLoad(Force):
         near, far = tuple((2.0 * a + b) / 3.0), tuple((a + 2.0 * b) / 3.0)
         return [(body.name, near, 0.5 * length * load), (body.name, far, 0.5 * length * self.end_factor * load)]
 
+    def _on_modal_body(self, body: ModalBody) -> Placement:
+        """The load on the mass of frame and modes."""
+        if self.per_mass is None or self.start is not None or self.end is not None or self.end_factor != 1.0:
+            raise ModelError(
+                f"distributed_load '{self.name}': Expected per_mass without start, end and end_factor for the modal "
+                f"body '{self.body}': the invariants of its modes hold its mass, not where its nodes are."
+            )
+        data = body.data
+        by_q = moment_pattern(data.size)
+        by_q[:3, 3:7] = self.axes == "body"
+        none = np.zeros_like(by_q)
+        return Placement(
+            bodies=(body.frame,), coordinates=body.modes, inputs=self.input_names(),
+            integers=(int(self.axes == "body"), int(self.input is not None), data.size),
+            numbers=numbers_at(
+                SPREAD, mass=data.mass, load=self.per_mass, moment=[data.mass_moment, *data.translation]
+            ),
+            pattern=Pattern(by_q, none, none),
+        )  # fmt: skip
+
     def _placement(self, body: str, arm: np.ndarray, force: np.ndarray) -> Placement:
         """One point force."""
         jq, none = np.zeros((7, 7), bool), np.zeros((7, 7), bool)
@@ -126,7 +199,7 @@ class DistributedLoad(Force):
         return Placement(
             bodies=(body,),
             inputs=self.input_names(),
-            integers=(int(self.axes == "body"), int(self.input is not None)),
+            integers=(int(self.axes == "body"), int(self.input is not None), -1),
             numbers=numbers_at(LOAD, point=arm, force=force, moment=ORIGIN),
             pattern=Pattern(jq, none, none),
         )

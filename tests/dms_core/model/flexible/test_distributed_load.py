@@ -129,7 +129,10 @@ BALL = PointMass(name="ball", mass=1.0)
         ({"body": "rod", "per_volume": (1, 0, 0)}, "Expected per_length with start and end"),
         ({"body": "rod", "per_length": (1, 0, 0), "start": (1, 2, 3), "end": (1, 2, 3)}, "are the same point"),
         ({"body": "boom", "per_length": (1, 0, 0), "start": (0, 0, 0)}, "the load lies on all of the beam 'boom'"),
-        ({"body": "ball", "per_mass": (1, 0, 0)}, "Expected a beam or a rigid body, got the point_mass 'ball'"),
+        (
+            {"body": "ball", "per_mass": (1, 0, 0)},
+            "Expected a beam, a modal body or a rigid body, got the point_mass 'ball'",
+        ),
         ({"body": "boon", "per_mass": (1, 0, 0)}, "'boon' does not exist"),
     ],
 )
