@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from dms_core.model.element import Declaration
-from dms_core.model.flexible import BeamSection
+from dms_core.model.flexible import BeamSection, Interface, ModalData
 from dms_core.model.muscles import ThelenCurves
 from dms_core.model.ropes import PathPoint
 from dms_core.model.signals import Function, Signal
@@ -22,9 +22,9 @@ HEAD = """\
 
 Generated from the code by `python -m dms_core schema`; do not edit.
 
-A model file is YAML with the keys `name`, `compositions`, `bodies`, `constraints`, `forces`, `sensors` and `inputs`; each
-of the last six holds a list of declarations. `kind` chooses what is declared, `name` is unique in the whole file, `ground` is the
-fixed frame. All numbers are in SI units (m, kg, s, N) and radians. Keys that are left out take their
+A model file is YAML with the keys `name`, `compositions`, `bodies`, `constraints`, `forces`, `sensors` and `inputs`;
+each of the last six holds a list of declarations. `kind` chooses what is declared, `name` is unique in the whole file,
+`ground` is the fixed frame. All numbers are in SI units (m, kg, s, N) and radians. Keys that are left out take their
 default; a required key left out, a wrong type, and a key or kind that does not exist are errors that name file, line
 and element.
 
@@ -57,7 +57,7 @@ INTRODUCTIONS = {
     "sensors": "What is measured.",
     "inputs": "Courses in time u(t), named by the elements that follow them. `kind: input` may be left out.",
 }
-PARTS = (BeamSection, PathPoint, ThelenCurves)
+PARTS = (BeamSection, Interface, ModalData, PathPoint, ThelenCurves)
 """Mappings inside declarations."""
 
 

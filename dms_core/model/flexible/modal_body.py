@@ -10,9 +10,9 @@ from pydantic import Field, model_validator
 
 from dms_core.errors import ModelError
 from dms_core.model.element import Composition, Parts, Quaternion, Vector
-from dms_core.model.flexible.floating_frame import FloatingFrame
+from dms_core.model.flexible.floating_frame import FloatingFrame, modes_of
 from dms_core.model.flexible.interface_frame import InterfaceFrame
-from dms_core.model.flexible.modal_data import ModalData
+from dms_core.model.flexible.modal_data import ModalData, nested
 from dms_core.model.flexible.modal_node import ModalNode
 from dms_core.model.geometry.frames import g_matrix, rotation_matrix
 from dms_core.validation import Checked
@@ -64,6 +64,11 @@ class ModalBody(Composition):
         """Name of the floating frame."""
         return f"{self.name}.frame"
 
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """Full names of the modal coordinates."""
+        return modes_of(self.frame, self.data)
+
     def parts(self) -> Parts:
         """Floating frame, then each interface with the constraint that holds it."""
         p = np.array(self.orientation) / np.linalg.norm(self.orientation)
@@ -102,7 +107,8 @@ class ModalBody(Composition):
         Args:
             name: of the body.
             nodes: positions in the floating frame [m], shape (k, 3).
-            mass, stiffness: M and K, shape (d, d), d = 6 k, or 3 k for nodes without rotations.
+            mass: M, shape (d, d), d = 6 k, or 3 k for nodes without rotations.
+            stiffness: K, shape (d, d).
             modes: Phi, shape (d, n), orthogonal in both and free of rigid motions, as `craig_bampton` gives them.
             interfaces: number of the node for each name of an interface.
             settings: further keys of the class.
@@ -110,24 +116,22 @@ class ModalBody(Composition):
         Raises:
             ModelError: see ModalData.of; or an interface names no node, or one without rotations.
         """
-        data = ModalData.of(nodes, mass, stiffness, modes)
+        who, data = f"modal_body '{name}'", ModalData.of(nodes, mass, stiffness, modes)
         x, per = np.asarray(nodes, float), len(modes) // len(nodes)
         found = []
         for key, k in (interfaces or {}).items():
             if not 0 <= k < len(x):
-                raise ModelError(
-                    f"modal_body '{name}': interface '{key}': Expected a node from 0 to {len(x) - 1}, got {k}."
-                )
+                raise ModelError(f"{who}: interface '{key}': Expected a node from 0 to {len(x) - 1}, got {k}.")
             if per == 3:
                 raise ModelError(
-                    f"modal_body '{name}': interface '{key}': Expected a node with rotations; a model of displacements "
-                    "alone needs a node that averages those of a face."
+                    f"{who}: interface '{key}': Expected a node with rotations; a model of displacements alone needs a "
+                    "node that averages those of a face."
                 )
             shapes = np.asarray(modes, float)[per * k : per * (k + 1)].T
             found.append(
                 Interface(
-                    name=key, point=tuple(x[k]), translations=tuple(map(tuple, shapes[:, :3])),
-                    rotations=tuple(map(tuple, shapes[:, 3:])),
+                    name=key, point=tuple(x[k]), translations=nested(shapes[:, :3], np.abs(shapes[:, :3]).max()),
+                    rotations=nested(shapes[:, 3:], np.abs(shapes[:, 3:]).max()),
                 )
             )  # fmt: skip
         return cls(name=name, data=data, interfaces=tuple(found), **settings)

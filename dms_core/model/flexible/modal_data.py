@@ -1,13 +1,13 @@
 """What a modal body is to the equations of motion: a few numbers, computed once from mass, stiffness and modes.
 
 The nodes of a finite-element model lie at x_k in the floating frame and have three displacements each, or three
-displacements and three rotations. With its mass M, its stiffness K and modes Phi, displacements u = Phi eta, the velocity
-of the frame (w, omega, in its axes) and the modal rates give the model's nodes the velocities
+displacements and three rotations. With its mass M, its stiffness K and modes Phi, displacements u = Phi eta, the
+velocity of the frame (w, omega, in its axes) and the modal rates give the model's nodes the velocities
 
     V = S_t w + S_r(x + u) omega + Phi eta_t       (S_r: omega x (x_k + u_k), and omega for the rotations)
 
-and T = 1/2 V^T M V is polynomial in eta. Its coefficients are the invariants (A. A. Shabana (2013), Dynamics of Multibody
-Systems, sect. 5.3; for a mass matrix alone, A. Zwölfer and J. Gerstmayr (2020), Acta Mech. 231:2757-2782):
+and T = 1/2 V^T M V is polynomial in eta. Its coefficients are the invariants (A. A. Shabana (2013), Dynamics of
+Multibody Systems, sect. 5.3; from a mass matrix alone, A. Zwölfer and J. Gerstmayr (2020), Acta Mech. 231:2757-2782):
 
     m = S_t^T M S_t,   c = c_0 + P eta,  P = S_t^T M Phi,   J = J_0 + eta_a J1_a + eta_a eta_b J2_ab,
     R = R_0 + eta_a R1_a,  R_0 = S_r^T M Phi:    T = m w.w / 2 + w.(omega x c + P eta_t) + omega.J omega / 2
@@ -16,7 +16,7 @@ Systems, sect. 5.3; for a mass matrix alone, A. Zwölfer and J. Gerstmayr (2020)
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -31,14 +31,26 @@ ORTHOGONAL = 1e-6
 """Cosine between two modes, in the metric of mass or stiffness, from which they count as not orthogonal."""
 ALIKE = 1e-8
 """Relative difference up to which a matrix counts as symmetric, and a mass as the same in all directions."""
+ROUNDING = 1e-12
+"""Share of what a product of shapes could be at most that is not told from 0."""
 STIFF = 1e-10
 """Share of the largest modal stiffness over modal mass below which a mode is a motion without strain."""
 
 
-def six(J: np.ndarray) -> tuple[float, ...]:
-    """(xx, yy, zz, xy, xz, yz) of a matrix, its symmetric part."""
-    S = 0.5 * (J + J.T)
-    return tuple(float(S[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+def six(J: np.ndarray) -> np.ndarray:
+    """(xx, yy, zz, xy, xz, yz) of matrices, their symmetric parts: shape (..., 3, 3) to (..., 6)."""
+    S = 0.5 * (J + J.swapaxes(-1, -2))
+    return S[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
+def nested(x: np.ndarray, size: np.ndarray | float) -> Any:
+    """The array as nested tuples, with 0 for what is rounding beside `size`, of a shape that x broadcasts with."""
+    clean = np.where(np.abs(x) > ROUNDING * size, x, 0.0).tolist()
+    return _tuples(clean)
+
+
+def _tuples(x: Any) -> Any:
+    return tuple(map(_tuples, x)) if isinstance(x, list) else x
 
 
 def skew(x: np.ndarray) -> np.ndarray:
@@ -99,7 +111,7 @@ class ModalData(Checked):
 
         Args:
             nodes: positions of the nodes in the floating frame [m], shape (k, 3).
-            mass: M, shape (d, d), d = 3 k (displacements) or 6 k (displacements and rotations of node 0, of node 1, ...).
+            mass: M, shape (d, d), d = 3 k (displacements of node 0, of node 1, ...) or 6 k (and rotations).
             stiffness: K, shape (d, d).
             modes: Phi, shape (d, n): orthogonal in M and in K, none of them a rigid motion.
 
@@ -117,19 +129,25 @@ class ModalData(Checked):
                 f"mass matrix: Expected one mass in all directions, got {np.diag(total)} kg along x, y, z and "
                 f"{np.abs(total - np.diag(np.diag(total))).max():.3g} kg between them."
             )
-        turned = [_turned(Phi[:, a], per) for a in range(Phi.shape[1])]
-        first = S_t.T @ M @ S_r
+        turned = np.array([_turned(Phi[:, a], per) for a in range(Phi.shape[1])])
+        # S_t^T M S_r = -skew(c_0).
+        first, M_r, M_turned = S_t.T @ M @ S_r, M @ S_r, M @ turned
+        J, J1 = S_r.T @ M_r, np.einsum("ij,aik->ajk", M_r, turned)
+        m, m_a = float(total[0, 0]), np.einsum("ia,ia->a", Phi, A)
+        # What is rounding is told by what Cauchy and Schwarz allow.
+        length, root = np.sqrt(np.trace(J) / m), np.sqrt(m_a)
+        alone, both = np.sqrt(m) * root[:, None], root[:, None, None] * root[:, None]
         return cls(
-            mass=float(total[0, 0]),
-            mass_moment=(float(first[1, 2]) * -1.0, float(first[0, 2]), float(first[0, 1]) * -1.0),
-            inertia=six(S_r.T @ M @ S_r),
-            modal_mass=tuple(np.einsum("ia,ia->a", Phi, A)),
-            modal_stiffness=tuple(np.einsum("ia,ia->a", Phi, K @ Phi)),
-            translation=_columns(S_t.T @ A),
-            rotation=_columns(S_r.T @ A),
-            inertia_rate=tuple(six(S_r.T @ M @ T + T.T @ M @ S_r) for T in turned),
-            inertia_curvature=tuple(tuple(six(T.T @ M @ U) for U in turned) for T in turned),
-            rotation_rate=tuple(_columns(T.T @ A) for T in turned),
+            mass=m,
+            mass_moment=nested(first[[1, 2, 0], [2, 0, 1]], m * length),
+            inertia=nested(six(J), m * length**2),
+            modal_mass=nested(m_a, 0.0),
+            modal_stiffness=nested(np.einsum("ia,ia->a", Phi, K @ Phi), 0.0),
+            translation=nested((S_t.T @ A).T, alone),
+            rotation=nested((S_r.T @ A).T, alone * length),
+            inertia_rate=nested(six(J1 + J1.swapaxes(1, 2)), alone * length),
+            inertia_curvature=nested(six(np.einsum("aij,bik->abjk", turned, M_turned)), both),
+            rotation_rate=nested(np.einsum("aij,ib->abj", turned, A), both),
         )
 
 
@@ -148,11 +166,6 @@ def _turned(u: np.ndarray, per: int) -> np.ndarray:
     out = np.zeros((len(u) // per, per, 3))
     out[:, :3] = [-skew(p) for p in u.reshape(-1, per)[:, :3]]
     return out.reshape(-1, 3)
-
-
-def _columns(A: np.ndarray) -> tuple:
-    """Columns of a matrix of three rows."""
-    return tuple(tuple(float(x) for x in column) for column in A.T)
 
 
 def _check_shapes(x: np.ndarray, M: np.ndarray, K: np.ndarray, Phi: np.ndarray) -> None:
@@ -185,15 +198,15 @@ def _check_modes(Phi: np.ndarray, M: np.ndarray, K: np.ndarray) -> None:
     if not (k / m).min() > STIFF * np.abs(k / m).max():
         a = int(np.argmin(k / m))
         raise ModelError(
-            f"modes: Expected modes that strain the body, got the stiffness {k[a]:.3g} of mode {a}. Leave rigid motions "
-            "out: the floating frame makes them."
+            f"modes: Expected modes that strain the body, got the stiffness {k[a]:.3g} of mode {a}. Leave rigid "
+            "motions out: the floating frame makes them."
         )
     for name, B in products:
         size = np.sqrt(np.diag(B))
         cosine = np.abs(B / np.outer(size, size) - np.eye(len(B)))
-        a, b = np.unravel_index(np.argmax(cosine), cosine.shape)
-        if cosine[a, b] > ORTHOGONAL:
+        one, other = divmod(int(np.argmax(cosine)), len(B))
+        if cosine[one, other] > ORTHOGONAL:
             raise ModelError(
-                f"modes: Expected modes that are orthogonal in the {name} matrix, got a cosine of {cosine[a, b]:.3g} "
-                f"between the modes {min(a, b)} and {max(a, b)}. `craig_bampton` and `orthogonal` give such modes."
+                f"modes: Expected modes that are {name}-orthogonal, got a cosine of {cosine[one, other]:.3g} between "
+                f"modes {min(one, other)} and {max(one, other)}. `craig_bampton` and `orthogonal` give such modes."
             )

@@ -131,7 +131,7 @@ BALL = PointMass(name="ball", mass=1.0)
         ({"body": "boom", "per_length": (1, 0, 0), "start": (0, 0, 0)}, "the load lies on all of the beam 'boom'"),
         (
             {"body": "ball", "per_mass": (1, 0, 0)},
-            "Expected a beam, a modal body or a rigid body, got the point_mass 'ball'",
+            "a modal body or a rigid body, got the point_mass 'ball'",
         ),
         ({"body": "boon", "per_mass": (1, 0, 0)}, "'boon' does not exist"),
     ],
