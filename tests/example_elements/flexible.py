@@ -100,12 +100,16 @@ def modal_data(n: int = 3) -> ModalData:
     )  # fmt: skip
 
 
-def modal_system(**more) -> System:
+def modal_body() -> ModalBody:
     """A modal body with one interface."""
     rng, data = np.random.default_rng(2), modal_data()
     tip = Interface(name="tip", point=(0.4, 0.1, -0.2), translations=_random(rng, 3, 3), rotations=_random(rng, 3, 3))
-    body = ModalBody(name="link", data=data, interfaces=(tip,), damping_ratio=0.2)
-    return System(compositions=[body], **more)
+    return ModalBody(name="link", data=data, interfaces=(tip,), damping_ratio=0.2)
+
+
+def modal_system(**more) -> System:
+    """That body alone."""
+    return System(compositions=[modal_body()], **more)
 
 
 def frame() -> Example:

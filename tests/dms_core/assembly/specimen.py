@@ -43,11 +43,15 @@ from dms_core.model import (
     System,
     ThelenMuscle,
 )
-from dms_core.model.element import Constraint, DynamicElement
+from dms_core.model.element import Body, Constraint, DynamicElement
+from tests.example_elements.flexible import modal_body
 
 INERTIA = (0.02, 0.03, 0.025, 0.002, -0.003, 0.004)
 
-BODIES = (
+MODAL = modal_body().parts()
+
+BODIES: tuple[Body, ...] = (
+    *MODAL.bodies,
     RigidBody(name="upper", mass=1.8, inertia=INERTIA, centre_of_mass=(0.0, -0.2, 0.02)),
     RigidBody(
         name="lower",
@@ -72,6 +76,7 @@ def _path(*points: tuple) -> tuple[PathPoint, ...]:
 
 
 CONSTRAINTS: tuple[Constraint, ...] = (
+    *MODAL.constraints,
     Revolute(name="shoulder", body_j="upper", axis_i=(0.1, -0.2, 1.0)),
     Revolute(name="elbow", body_i="upper", body_j="lower", point_i=(0.0, -0.4, 0.0), axis_i=(0.05, 0.04, 1.0)),
     Fixed(name="weld", body_i="lower", body_j="plate", point_i=(0.0, -0.2, 0.0)),

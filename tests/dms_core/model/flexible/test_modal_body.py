@@ -106,7 +106,7 @@ def test_weight():
 
 @pytest.mark.parametrize("axes", ["ground", "body"])
 def test_in_free_fall_nothing_bends(axes):
-    body = link(position=(1.0, 2.0, 3.0), orientation=(0.5, 0.5, -0.5, 0.5))
+    body = link(0, position=(1.0, 2.0, 3.0), orientation=(0.5, 0.5, -0.5, 0.5))
     load = DistributedLoad(name="weight", body="link", per_mass=(0.0, -9.0, 1.0), axes=axes)
     run = simulate(System(compositions=[body], forces=[load]), 0.3).check()
     modes = [run.model.layout.index[name] for name in body.modes]
