@@ -12,7 +12,7 @@ with J_a = J1_a + 2 eta_b J2_ab the derivative of J. Nothing but the modes is li
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -20,183 +20,32 @@ from pydantic import Field, model_validator
 import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
+from dms_core.model.flexible.frame_sums import (
+    AXES,
+    FRAME,
+    MODE,
+    PAIR,
+    UNITS,
+    ZERO,
+    combined,
+    inertia_by,
+    inertia_rate_times,
+    inertia_times,
+    mode_at,
+    motion,
+    pair_at,
+    rotation_by,
+    rotation_of,
+    rotation_rate,
+    rotations_times,
+    spin,
+    spin_pull,
+    sym_times,
+)
 from dms_core.model.flexible.modal_data import ModalData
 from dms_core.model.geometry.frames import g_matrix, rotation_matrix
 from dms_core.model.geometry.rotations import add, bilinear, cross, dot, euler_parameters, rotated, scale, sub, vec
 from dms_core.model.places import numbers_at
-
-
-class FrameNumbers(NamedTuple):
-    """Places of the kernel's numbers: then come n blocks of ModeNumbers and n x n of PairNumbers."""
-
-    mass: int = 0
-    moment: int = 1
-    inertia: int = 4
-    modes: int = 10
-
-
-class ModeNumbers(NamedTuple):
-    """Places within the block of one mode."""
-
-    mass: int = 0
-    stiffness: int = 1
-    damping: int = 2
-    translation: int = 3
-    rotation: int = 6
-    inertia: int = 9
-    """J1."""
-
-
-class PairNumbers(NamedTuple):
-    """Places within the block of two modes a, b, at number a n + b."""
-
-    rotation: int = 0
-    """R1_a of mode b."""
-    inertia: int = 3
-    """J2_ab."""
-
-
-FRAME, MODE, PAIR = FrameNumbers(), ModeNumbers(), PairNumbers()
-MODE_SIZE, PAIR_SIZE = 15, 9
-UNITS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-ZERO = (0.0, 0.0, 0.0)
-
-
-class Motion(NamedTuple):
-    """Velocities and accelerations of the frame, in its axes, and what follows from the modes' state."""
-
-    z: tuple
-    omega: tuple
-    alpha: tuple
-    c: tuple
-    c_t: tuple
-    """P eta_t."""
-    Jo: tuple
-    """J omega + R eta_t."""
-
-
-@compiled
-def mode_at(a):
-    """Place of the block of mode a."""
-    return FRAME.modes + MODE_SIZE * a
-
-
-@compiled
-def pair_at(n, a, b):
-    """Place of the block of the modes a, b out of n."""
-    return FRAME.modes + MODE_SIZE * n + PAIR_SIZE * (a * n + b)
-
-
-@compiled
-def spin(p, x):
-    """2 G(p) x."""
-    c = strain.product(strain.conjugate(p), x)
-    return (2.0 * c[1], 2.0 * c[2], 2.0 * c[3])
-
-
-@compiled
-def spin_pull(p, t):
-    """2 G(p)^T t."""
-    c = strain.product(p, (0.0, t[0], t[1], t[2]))
-    return (2.0 * c[0], 2.0 * c[1], 2.0 * c[2], 2.0 * c[3])
-
-
-@compiled
-def sym_times(par, at, w):
-    """J w for the six numbers of J from `at`."""
-    return (
-        par[at] * w[0] + par[at + 3] * w[1] + par[at + 4] * w[2],
-        par[at + 3] * w[0] + par[at + 1] * w[1] + par[at + 5] * w[2],
-        par[at + 4] * w[0] + par[at + 5] * w[1] + par[at + 2] * w[2],
-    )
-
-
-@compiled
-def combined(par, n, place, x):
-    """Sum over modes of their triple at `place` times x[7 + a]: P or R_0 times rates, or c less c_0."""
-    s = ZERO
-    for a in range(n):
-        s = add(s, scale(x[7 + a], vec(par, mode_at(a) + place)))
-    return s
-
-
-@compiled
-def rotation_of(par, n, a, q):
-    """R_a at eta."""
-    s = vec(par, mode_at(a) + MODE.rotation)
-    for b in range(n):
-        s = add(s, scale(q[7 + b], vec(par, pair_at(n, b, a) + PAIR.rotation)))
-    return s
-
-
-@compiled
-def rotation_rate(par, n, a, x):
-    """Sum over b of x[7 + b] R1_b of mode a: Rdot_a for the rates."""
-    s = ZERO
-    for b in range(n):
-        s = add(s, scale(x[7 + b], vec(par, pair_at(n, b, a) + PAIR.rotation)))
-    return s
-
-
-@compiled
-def rotation_by(par, n, a, x):
-    """Sum over b of R1_a of mode b times x[7 + b]: derivative of R x by eta_a."""
-    s = ZERO
-    for b in range(n):
-        s = add(s, scale(x[7 + b], vec(par, pair_at(n, a, b) + PAIR.rotation)))
-    return s
-
-
-@compiled
-def inertia_by(par, n, a, q, w):
-    """J_a w, J_a the derivative of J by eta_a at eta."""
-    s = sym_times(par, mode_at(a) + MODE.inertia, w)
-    for b in range(n):
-        s = add(s, scale(2.0 * q[7 + b], sym_times(par, pair_at(n, a, b) + PAIR.inertia, w)))
-    return s
-
-
-@compiled
-def inertia_times(par, n, q, w):
-    """J w at eta."""
-    s = sym_times(par, FRAME.inertia, w)
-    for a in range(n):
-        s = add(s, scale(q[7 + a], sym_times(par, mode_at(a) + MODE.inertia, w)))
-        for b in range(n):
-            s = add(s, scale(q[7 + a] * q[7 + b], sym_times(par, pair_at(n, a, b) + PAIR.inertia, w)))
-    return s
-
-
-@compiled
-def inertia_rate_times(par, n, q, v, w):
-    """Jdot w."""
-    s = ZERO
-    for a in range(n):
-        s = add(s, scale(v[7 + a], inertia_by(par, n, a, q, w)))
-    return s
-
-
-@compiled
-def rotations_times(par, n, q, x):
-    """R x, x the modal part of v or a."""
-    s = ZERO
-    for a in range(n):
-        s = add(s, scale(x[7 + a], rotation_of(par, n, a, q)))
-    return s
-
-
-@compiled
-def motion(par, n, q, v, a):
-    """The state as the equations need it."""
-    p, r_tt = euler_parameters(q, 0), vec(a, 0)
-    back = strain.conjugate(p)
-    omega = spin(p, euler_parameters(v, 0))
-    return Motion(
-        bilinear(back, back, r_tt), omega, spin(p, euler_parameters(a, 0)),
-        add(vec(par, FRAME.moment), combined(par, n, MODE.translation, q)), combined(par, n, MODE.translation, v),
-        add(inertia_times(par, n, q, omega), rotations_times(par, n, q, v)),
-    )  # fmt: skip
 
 
 @compiled
@@ -229,7 +78,7 @@ def mode_row(par, n, k, q, v, a, s):
 
 
 @compiled
-def _put(J, column, n, q, f, t):
+def _put(J, column, q, f, t):
     """Force and moment in body axes into the rows of r and p of one column."""
     g, h = rotated(q, 0, f), spin_pull(euler_parameters(q, 0), t)
     for i in range(3):
@@ -245,7 +94,7 @@ def _put_motion(par, n, q, v, s, dz, dw, da, J, column):
     f = add(f, scale(2.0, cross(dw, s.c_t)))
     t = add(cross(s.c, dz), add(inertia_times(par, n, q, da), inertia_rate_times(par, n, q, v, dw)))
     t = add(t, add(cross(dw, s.Jo), cross(s.omega, inertia_times(par, n, q, dw))))
-    _put(J, column, n, q, f, t)
+    _put(J, column, q, f, t)
     for k in range(n):
         gyro = sub(rotation_rate(par, n, k, v), rotation_by(par, n, k, v))
         J[7 + k, column] += (
@@ -294,13 +143,13 @@ def _mode_derivatives(par, n, k, q, v, a, s, Jq, Jv, Ja):
         # By its rate.
         Jv[7 + b, column] += dot(sub(R1, vec(par, pair_at(n, b, k) + PAIR.rotation)), w)
     Jq[column, column] += par[at + MODE.stiffness]
-    _put(Jq, column, n, q, f, t)
+    _put(Jq, column, q, f, t)
     t = add(rotation_rate(par, n, k, v), rotation_by(par, n, k, v))
     t = add(t, add(inertia_by(par, n, k, q, w), cross(w, R)))
     Jv[column, column] += par[at + MODE.damping]
-    _put(Jv, column, n, q, scale(2.0, cross(w, P)), t)
+    _put(Jv, column, q, scale(2.0, cross(w, P)), t)
     Ja[column, column] += par[at + MODE.mass]
-    _put(Ja, column, n, q, P, R)
+    _put(Ja, column, q, P, R)
 
 
 @compiled

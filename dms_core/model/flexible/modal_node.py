@@ -17,7 +17,8 @@ from pydantic import Field, model_validator
 import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Constraint, ConstraintPattern, Placement, Vector
-from dms_core.model.flexible.floating_frame import UNITS, FloatingFrame
+from dms_core.model.flexible.floating_frame import FloatingFrame
+from dms_core.model.flexible.frame_sums import AXES, UNITS
 from dms_core.model.geometry.rotations import (
     add,
     add_hessian,
@@ -32,7 +33,6 @@ from dms_core.model.geometry.rotations import (
     vec,
 )
 
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 FIRST = 14
 """First modal coordinate among the local ones."""
 
