@@ -34,8 +34,8 @@ class ModalBody(Composition):
     Its parts are the body `<name>.frame` and, for each interface, the body `<name>.<interface>`, a frame without mass
     that moves with the node. A weight acts on it through `gravity` or `distributed_load`.
 
-    Modes do not know that a load along the body stiffens or softens it: where it spins as fast as it vibrates, or bears a
-    good part of its buckling load, a `beam` is right.
+    Modes do not know that a load along the body stiffens or softens it: where it spins as fast as it vibrates, or bears
+    a good part of its buckling load, a `beam` is right.
     """
 
     kind: ClassVar[str] = "modal_body"
