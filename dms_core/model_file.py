@@ -22,12 +22,13 @@ from dms_core.errors import DmsError, InputError, ModelError, choices
 from dms_core.files.yaml_builder import Section
 from dms_core.files.yaml_text import read_yaml, yaml_of
 from dms_core.model.constraints.euler_norm import EulerNorm
-from dms_core.model.element import Body, Constraint, Declaration, Force, Sensor
+from dms_core.model.element import Body, Composition, Constraint, Declaration, Force, Sensor
 from dms_core.model.signals import Function, Input
 from dms_core.model.system import System
 from dms_core.validation import cut, shown
 
 BRANCHES: dict[str, type[Declaration]] = {
+    "compositions": Composition,
     "bodies": Body,
     "constraints": Constraint,
     "forces": Force,
@@ -91,8 +92,9 @@ def _check_names(path: str | Path, system: System, lines: dict[str, int]) -> Non
         Layout(system)
     except ModelError as error:
         # What concerns no single element (a system without bodies) is said when the model is compiled.
-        if error.element in lines:
-            raise ModelError(f"{path}, line {lines[error.element]}: {error}", error.element) from None
+        declared = system.composed.get(error.element, error.element)
+        if declared in lines:
+            raise ModelError(f"{path}, line {lines[declared]}: {error}", error.element) from None
 
 
 def _section(path: str | Path, section: str, items: Any) -> list[tuple[Declaration, int]]:
@@ -135,10 +137,8 @@ def dump(system: System) -> str:
         InputError: an input is a Python function, which no file can hold.
     """
     content: dict[str, Any] = {"name": system.name}
-    companions = system.companions
     for section in BRANCHES:
-        declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm) and e.name not in companions]
-        if declared:
+        if declared := system.own(section):
             content[section] = [_plain(e) for e in declared]
     return yaml_of(content, default_flow_style=None, allow_unicode=True)
 

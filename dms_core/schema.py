@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from dms_core.model.constraints.couplings.linear_coupling import JointTerm
 from dms_core.model.element import Declaration
+from dms_core.model.flexible import BeamSection, Interface, ModalData
 from dms_core.model.forces import BushingCurves, LoadCurve
 from dms_core.model.muscles import ThelenCurves
 from dms_core.model.ropes import PathPoint
@@ -23,9 +24,9 @@ HEAD = """\
 
 Generated from the code by `python -m dms_core schema`; do not edit.
 
-A model file is YAML with the keys `name`, `bodies`, `constraints`, `forces`, `sensors` and `inputs`; each of the last
-five holds a list of declarations. `kind` chooses what is declared, `name` is unique in the whole file, `ground` is the
-fixed frame. All numbers are in SI units (m, kg, s, N) and radians. Keys that are left out take their
+A model file is YAML with the keys `name`, `compositions`, `bodies`, `constraints`, `forces`, `sensors` and `inputs`;
+each of the last six holds a list of declarations. `kind` chooses what is declared, `name` is unique in the whole file,
+`ground` is the fixed frame. All numbers are in SI units (m, kg, s, N) and radians. Keys that are left out take their
 default; a required key left out, a wrong type, and a key or kind that does not exist are errors that name file, line
 and element.
 
@@ -51,13 +52,14 @@ component with its unit at the end of the name.
 """
 
 INTRODUCTIONS = {
+    "compositions": "What stands for several bodies, constraints and forces, whose names begin with its own and a dot.",
     "bodies": "What has mass.",
     "constraints": "Equations between bodies: joints, guides, couplings, ropes of fixed length, drivers.",
     "forces": "Loads, springs, ropes, muscles, controllers, differential equations.",
     "sensors": "What is measured.",
     "inputs": "Courses in time u(t), named by the elements that follow them. `kind: input` may be left out.",
 }
-PARTS = (BushingCurves, JointTerm, LoadCurve, PathPoint, ThelenCurves)
+PARTS = (BeamSection, BushingCurves, Interface, JointTerm, LoadCurve, ModalData, PathPoint, ThelenCurves)
 """Mappings inside declarations."""
 
 

@@ -105,11 +105,11 @@ def _moved(value: Any, keys: list[str], change: float) -> Any:
 
 def _system_with(system: System, element: Any) -> System:
     """The same system with one declaration replaced."""
-    norms = sum(body.rigid for body in system.bodies)
-    lists = (system.bodies, system.constraints[norms:], system.forces, system.sensors, system.inputs)
-    names = ("bodies", "constraints", "forces", "sensors", "inputs")
-    replaced = [[element if x.name == element.name else x for x in items] for items in lists]
-    return System(system.name, **dict(zip(names, replaced, strict=True)))
+    if element.name in system.composed:
+        raise InputError(f"'{element.name}' is a part of '{system.composed[element.name]}'; name a number of that.")
+    sections = ("compositions", "bodies", "constraints", "forces", "sensors", "inputs")
+    replaced = {name: [element if x.name == element.name else x for x in system.own(name)] for name in sections}
+    return System(system.name, **replaced)  # type: ignore[arg-type]
 
 
 class ParameterDerivatives:

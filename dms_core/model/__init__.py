@@ -31,6 +31,21 @@ from dms_core.model.constraints import (
 )
 from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
+from dms_core.model.flexible import (
+    Beam,
+    BeamElement,
+    BeamLoad,
+    BeamSection,
+    DistributedLoad,
+    FloatingFrame,
+    Interface,
+    InterfaceFrame,
+    ModalBody,
+    ModalData,
+    ModalNode,
+    craig_bampton,
+    orthogonal,
+)
 from dms_core.model.forces import (
     Bushing,
     BushingCurves,
@@ -56,8 +71,11 @@ from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, M
 from dms_core.model.system import System
 
 __all__ = [
-    "GROUND",
     "AngleDriver",
+    "Beam",
+    "BeamElement",
+    "BeamLoad",
+    "BeamSection",
     "Belt",
     "Bushing",
     "BushingCurves",
@@ -66,18 +84,23 @@ __all__ = [
     "Cylindrical",
     "DelayedError",
     "Distance",
+    "DistributedLoad",
     "DrumRope",
     "EulerNorm",
     "FirstOrder",
     "Fixed",
+    "FloatingFrame",
     "ForceLoad",
     "Function",
+    "GROUND",
     "Gear",
     "Gravity",
     "Harmonic",
     "ImpedanceController",
     "Imu",
     "Input",
+    "Interface",
+    "InterfaceFrame",
     "JointAngle",
     "JointMoment",
     "JointMotor",
@@ -91,6 +114,9 @@ __all__ = [
     "LoadCurve",
     "LumpedLoad",
     "MinimumJerk",
+    "ModalBody",
+    "ModalData",
+    "ModalNode",
     "MuscleSensor",
     "PathPoint",
     "Pid",
@@ -121,4 +147,6 @@ __all__ = [
     "Tracking",
     "TurnCounter",
     "Universal",
+    "craig_bampton",
+    "orthogonal",
 ]

@@ -212,6 +212,14 @@ class DynamicElement(Declaration):
         """Names of the system inputs that the element reads."""
         return ()
 
+    def mass_moments(self, system) -> dict[str, np.ndarray]:
+        """First moments of the element's mass about r of a body, by body, in its axes [kg m], shape (1 + k, 3).
+
+        The first row is the moment at the start of the body's k further coordinates, 0; the others are its derivatives
+        by these, [kg m] over their unit. Most elements have none.
+        """
+        return {}
+
     def place(self, system) -> Placement:
         """Bodies, coordinates, inputs and tables of the one kernel call."""
         raise NotImplementedError
@@ -270,6 +278,22 @@ class Constraint(Declaration):
 
     def place(self, system) -> Placement:
         """Bodies, coordinates, inputs and tables of the kernel call."""
+        raise NotImplementedError
+
+
+class Parts(NamedTuple):
+    """What a composition stands for."""
+
+    bodies: tuple[Body, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    forces: tuple[Force, ...] = ()
+
+
+class Composition(Declaration):
+    """A declaration that stands for several others, whose names begin with its own and a dot."""
+
+    def parts(self) -> Parts:
+        """The declarations it stands for; the same ones each time."""
         raise NotImplementedError
 
 

@@ -8,8 +8,17 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import ModelError, choices
-from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.element import GROUND, Body, Constraint, Declaration, DynamicElement, Force, Sensor
+from dms_core.model.element import (
+    GROUND,
+    Body,
+    Composition,
+    Constraint,
+    Declaration,
+    DynamicElement,
+    Force,
+    Parts,
+    Sensor,
+)
 from dms_core.model.geometry.frames import rotation_matrix
 from dms_core.model.signals import Input
 
@@ -22,6 +31,7 @@ class System:
 
     Args:
         name: shown in reports.
+        compositions: declarations that stand for several bodies, constraints and forces each, which come first.
         bodies, constraints, forces, sensors, inputs: declarations; every name is used once.
 
     Raises:
@@ -32,6 +42,7 @@ class System:
         self,
         name: str = "system",
         *,
+        compositions: tuple[Composition, ...] | list[Composition] = (),
         bodies: tuple[Body, ...] | list[Body] = (),
         constraints: tuple[Constraint, ...] | list[Constraint] = (),
         forces: tuple[Force, ...] | list[Force] = (),
@@ -41,14 +52,19 @@ class System:
         from dms_core.model.constraints.euler_norm import EulerNorm
 
         self.name = name
-        self.bodies = self._checked("bodies", bodies, Body)
+        self.compositions = self._checked("compositions", compositions, Composition)
+        made = {composition.name: composition.parts() for composition in self.compositions}
+        parts = Parts(*(sum((p[k] for p in made.values()), ()) for k in range(len(Parts._fields))))
+        self.composed = {part.name: name for name, p in made.items() for of_a_kind in p for part in of_a_kind}
+        """Name of each part of a composition, and that of the composition."""
+        self.bodies = parts.bodies + self._checked("bodies", bodies, Body)
         norms = tuple(EulerNorm(name=f"{b.name}.euler_norm", body=b.name) for b in self.bodies if b.rigid)
         # Those of another system may be among the constraints that were taken over from it.
         declared = tuple(c for c in self._checked("constraints", constraints, Constraint) if c not in norms)
-        self.constraints = norms + declared
-        companions = tuple(e for c in declared for e in c.companions())
+        self.constraints = norms + parts.constraints + declared
+        companions = tuple(e for c in self.constraints for e in c.companions())
         given = tuple(f for f in self._checked("forces", forces, Force) if f not in companions)
-        self.forces = self._checked("companions of constraints", companions, Force) + given
+        self.forces = self._checked("companions of constraints", companions, Force) + parts.forces + given
         self.sensors = self._checked("sensors", sensors, Sensor)
         self.inputs = self._checked("inputs", inputs, Input)
         self._by_name: dict[str, Declaration] = {}
@@ -81,6 +97,13 @@ class System:
         """Names of the elements that came with constraints."""
         return frozenset(e.name for c in self.constraints for e in c.companions())
 
+    def own(self, section: str) -> tuple[Declaration, ...]:
+        """What was declared in a list ("bodies", ...): without unit-norm equations, companions and composed parts."""
+        from dms_core.model.constraints.euler_norm import EulerNorm
+
+        hidden = {*self.composed, *self.companions}
+        return tuple(e for e in getattr(self, section) if not isinstance(e, EulerNorm) and e.name not in hidden)
+
     @staticmethod
     def _checked(what: str, items: Any, kind: type) -> tuple:
         for item in items:
@@ -89,8 +112,8 @@ class System:
         return tuple(items)
 
     def everything(self) -> Iterator[Declaration]:
-        """All declarations, in the order bodies, constraints, forces, sensors, inputs."""
-        yield from (*self.bodies, *self.constraints, *self.forces, *self.sensors, *self.inputs)
+        """All declarations, in the order compositions, bodies, constraints, forces, sensors, inputs."""
+        yield from (*self.compositions, *self.bodies, *self.constraints, *self.forces, *self.sensors, *self.inputs)
 
     def element(self, name: str, kind: type | tuple[type, ...] | None = None) -> Any:
         """The declaration of that name; an unknown name or a wrong kind is an error that lists the right ones."""
@@ -112,10 +135,21 @@ class System:
             raise ModelError(f"body '{name}' does not exist. Declared: {choices(names)}.")
         return self._by_name[name]  # type: ignore[return-value]
 
+    def mass_moments(self) -> dict[str, np.ndarray]:
+        """First moments of mass about r of the bodies that have any [kg m], see DynamicElement.mass_moments."""
+        total: dict[str, np.ndarray] = {}
+        for element in (*self.bodies, *self.forces):
+            for body, moment in element.mass_moments(self).items():
+                before = total.get(body, np.zeros((0, 3)))
+                total[body] = np.zeros((max(len(before), len(moment)), 3))
+                for part in (before, moment):
+                    total[body][: len(part)] += part
+        return {body: moment for body, moment in total.items() if np.any(moment)}
+
     def arm(self, body: str, point) -> np.ndarray:
         """A point of a body's reference frame, seen from its centre of mass [m], shape (3,)."""
         found = self.body(body)
-        centre = found.centre_of_mass if isinstance(found, RigidBody) else (0.0, 0.0, 0.0)
+        centre = getattr(found, "centre_of_mass", (0.0, 0.0, 0.0))
         return np.asarray(point, float) - np.asarray(centre, float)
 
     def start_pose(self, body: str) -> tuple[np.ndarray, np.ndarray]:
@@ -123,7 +157,7 @@ class System:
         found = self.body(body)
         if found is None:
             return np.zeros(3), np.eye(3)
-        rotation = rotation_matrix(found.orientation) if isinstance(found, RigidBody) else np.eye(3)
+        rotation = rotation_matrix(found.orientation) if found.rigid else np.eye(3)  # type: ignore[attr-defined]
         return np.asarray(found.position, float), rotation  # type: ignore[attr-defined]
 
     def start_point(self, body_i: str, point, body_j: str) -> np.ndarray:

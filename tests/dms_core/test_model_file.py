@@ -128,7 +128,10 @@ def test_every_public_declaration_has_one_import_path():
 
 
 MISTAKES = {
-    "unknown section": (ROD + "joints: []\n", r"unknown key 'joints' at the top\. Allowed: bodies, constraints"),
+    "unknown section": (
+        ROD + "joints: []\n",
+        r"unknown key 'joints' at the top\. Allowed: bodies, compositions",
+    ),
     "unknown key": (
         ROD.replace("mass: 1.0", "mass: 1.0, weight: 3"),
         r"model.yaml, line 2: rigid_body 'rod': unknown key 'weight'\. Allowed: angular_velocity, centre_of_mass",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dms_core.model.element import Force
+from dms_core.model.flexible import Beam, BeamSection
 from dms_core.model.forces import (
     Bushing,
     BushingCurves,
@@ -18,8 +19,10 @@ from dms_core.model.forces import (
     TorsionSpring,
     TurnCounter,
 )
+from dms_core.model.system import System
 from tests.example_elements import Example
 from tests.example_elements.constraints import HINGE
+from tests.example_elements.flexible import modal_system
 from tests.example_elements.pair import pair
 
 LOAD = {"body": "lower", "point": (0.03, -0.1, 0.05), "force": (3.0, -20.0, 5.0), "moment": (0.4, -0.6, 2.0)}
@@ -33,6 +36,22 @@ def _force(element: Force, *inputs: str) -> Example:
 def gravity() -> Example:
     """All three bodies, gravity along no axis."""
     return _force(Gravity(name="weight_of_all", acceleration=(1.0, -9.0, 2.0)))
+
+
+def weight_of_beam() -> Example:
+    """Nodes about which the beam's mass has a moment."""
+    section = BeamSection(
+        youngs_modulus=1.0, shear_modulus=1.0, area=0.5, inertia_y=0.1, inertia_z=0.1, torsion_constant=0.1, density=3.0
+    )
+    beam = Beam(name="boom", section=section, length=1.0, elements=1)
+    element = Gravity(name="weight", acceleration=(1.0, -9.0, 2.0))
+    return Example(System(compositions=[beam], forces=[element]), element)
+
+
+def weight_of_modes() -> Example:
+    """A floating frame, whose modes move its mass."""
+    element = Gravity(name="weight", acceleration=(1.0, -9.0, 2.0))
+    return Example(modal_system(forces=[element]), element)
 
 
 def load() -> Example:
@@ -153,7 +172,11 @@ EXAMPLES = {
     "joint_motor": (motor,),
     "torsion_spring": (wound_spring, straight_wound_spring),
     "turn_counter": (counter,),
-    "gravity": (gravity,),
+    "gravity": (
+        gravity,
+        weight_of_beam,
+        weight_of_modes,
+    ),
     "lumped_load": (load, following_load, pure_moment),
     "spring_damper": (spring, undamped_spring),
     "joint_spring_damper": (joint_spring, joint_spring_without_damping),

@@ -10,11 +10,14 @@ from dms_core.assembly.layout import Layout
 from dms_core.assembly.model import Model
 from dms_core.model import (
     AngleDriver,
+    BeamElement,
+    BeamSection,
     Belt,
     Bushing,
     Constant,
     Cylindrical,
     Distance,
+    DistributedLoad,
     DrumRope,
     FirstOrder,
     Fixed,
@@ -54,11 +57,15 @@ from dms_core.model import (
     TurnCounter,
     Universal,
 )
-from dms_core.model.element import Constraint, DynamicElement
+from dms_core.model.element import Body, Constraint, DynamicElement
+from tests.example_elements.flexible import modal_body
 
 INERTIA = (0.02, 0.03, 0.025, 0.002, -0.003, 0.004)
 
-BODIES = (
+MODAL = modal_body().parts()
+
+BODIES: tuple[Body, ...] = (
+    *MODAL.bodies,
     RigidBody(name="upper", mass=1.8, inertia=INERTIA, centre_of_mass=(0.0, -0.2, 0.02)),
     RigidBody(
         name="lower",
@@ -97,6 +104,7 @@ def _path(*points: tuple) -> tuple[PathPoint, ...]:
 
 
 CONSTRAINTS: tuple[Constraint, ...] = (
+    *MODAL.constraints,
     Revolute(name="shoulder", body_j="upper", axis_i=(0.1, -0.2, 1.0)),
     Revolute(name="elbow", body_i="upper", body_j="lower", point_i=(0.0, -0.4, 0.0), axis_i=(0.05, 0.04, 1.0)),
     Fixed(name="weld", body_i="lower", body_j="plate", point_i=(0.0, -0.2, 0.0)),
@@ -173,6 +181,31 @@ FORCES: tuple[DynamicElement, ...] = (
     TorsionSpring(name="coil", joint="cog_axle", stiffness=3.0, damping=0.2),
     JointMotor(name="servo", joint="tube", input="factor"),
     TurnCounter(name="turns", joint="tube"),
+    BeamElement(
+        name="strut",
+        body_i="lift",
+        body_j="wheel",
+        damping_time=0.02,
+        mass="consistent",
+        rest_curvature=(0.1, 0.2, 0.3),
+        section=BeamSection(
+            youngs_modulus=3e3,
+            shear_modulus=1e3,
+            area=2e-2,
+            inertia_y=3e-2,
+            inertia_z=2e-2,
+            torsion_constant=4e-2,
+            density=5.0,
+        ),
+    ),
+    DistributedLoad(
+        name="wind",
+        body="weight",
+        per_length=(3.0, 0.0, 5.0),
+        start=(0.0, -0.1, 0.1),
+        end=(0.1, 0.1, 0.0),
+        input="factor",
+    ),
     FirstOrder(name="lag", time_constant=0.1, gain=2.0, input="factor", start=0.4),
     SecondOrder(name="oscillator", mass=2.0, damping=0.3, stiffness=40.0, input="factor", start=0.2, start_rate=0.5),
     RopeForce(

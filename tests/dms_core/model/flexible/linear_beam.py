@@ -1,0 +1,47 @@
+"""Mass and stiffness of a straight beam of linear elements along x, six freedoms a node: what a program would export.
+
+Cubic bending without shear, linear stretch and twist (J. S. Przemieniecki (1968), Theory of Matrix Structural Analysis,
+sect. 5.6 and 11.3), rotary inertia about x only.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dms_core.model import BeamSection
+
+
+class LinearBeam(NamedTuple):
+    """Nodes (k, 3), mass and stiffness (6 k, 6 k)."""
+
+    nodes: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+
+
+def linear_beam(section: BeamSection, length: float, elements: int, start: float = 0.0) -> LinearBeam:
+    """The beam from x = start on."""
+    h, k = length / elements, elements + 1
+    M, K = np.zeros((6 * k, 6 * k)), np.zeros((6 * k, 6 * k))
+    bend = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], float)
+    heavy = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]], float) / 420.0
+    rod, share = np.array([[1, -1], [-1, 1]], float), np.array([[2, 1], [1, 2]], float) / 6.0
+    E, G, m = section.youngs_modulus, section.shear_modulus, section.mass_per_length * h
+    for e in range(elements):
+        o = 6 * e
+        for along, stiffness, weight in (
+            (0, E * section.area, m), (3, G * section.torsion_constant, section.inertia_per_length[0] * h)
+        ):  # fmt: skip
+            at = np.ix_([o + along, o + 6 + along], [o + along, o + 6 + along])
+            K[at] += stiffness / h * rod
+            M[at] += weight * share
+        for across, turn, sign, inertia in ((1, 5, 1.0, section.inertia_z), (2, 4, -1.0, section.inertia_y)):
+            scale = np.array([1.0, sign * h, 1.0, sign * h])
+            places = [o + across, o + turn, o + 6 + across, o + 6 + turn]
+            K[np.ix_(places, places)] += E * inertia / h**3 * bend * np.outer(scale, scale)
+            M[np.ix_(places, places)] += m * heavy * np.outer(scale, scale)
+    nodes = np.zeros((k, 3))
+    nodes[:, 0] = start + h * np.arange(k)
+    return LinearBeam(nodes, M, K)
