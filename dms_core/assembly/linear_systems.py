@@ -23,7 +23,7 @@ from dms_core.linear.ordering import SingularMatrixError
 from dms_core.linear.symbolic import LuTables, plan
 
 TYPICAL_C0 = 1.5e3
-"""c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen."""
+"""c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen first."""
 
 NEARBY_STATES, NEARBY = 6, 0.1
 """Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
@@ -122,8 +122,11 @@ class Sampling(NamedTuple):
     """Coordinates and independent constraint rows that are solved for."""
 
 
-def ordered_systems(where: Sampling, q: np.ndarray, v: np.ndarray, t: float) -> OrderedSystems:
+def ordered_systems(where: Sampling, q: np.ndarray, v: np.ndarray, t: float, c0: float = TYPICAL_C0) -> OrderedSystems:
     """Scatter and elimination orders of both systems, from their values at and near q, v, shape (n_q,), at time t.
+
+    The Newton matrix depends on c0 [1/s] too: in a short step masses outweigh dampers and springs, in a long one the
+    other way round, and what is a good pivot in one may be lost in rounding in the other.
 
     Raises:
         ModelError: the equations are singular there; names the unknowns that nothing determines.
@@ -141,7 +144,7 @@ def ordered_systems(where: Sampling, q: np.ndarray, v: np.ndarray, t: float) -> 
         newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
     ).best_order(_samples(
         layout, work, free, len(slots.number),
-        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, TYPICAL_C0, x),
+        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, c0, x),
     ))  # fmt: skip
     rates, slots = rate_pattern(layout, free, solved)
     packed_rates = Packed(rates)

@@ -11,7 +11,7 @@ from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
 from dms_core.assembly.layout import Call, Layout, same_structure
-from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
+from dms_core.assembly.linear_systems import TYPICAL_C0, Sampling, nominal_sizes, ordered_systems
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
@@ -142,29 +142,55 @@ class Model:
         """Constant tables (a packed Tables) for the compiled solver."""
         return self._tables
 
-    def reordered(self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals) -> Packed:
-        """Tables with independent rows and elimination orders chosen anew at q, v, shape (n_q,), and those inputs.
+    def reordered(self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0) -> Packed:
+        """Tables with independent rows and elimination orders chosen anew at a state.
+
+        Args:
+            q: position, shape (n_q,).
+            v: velocity, shape (n_q,).
+            t: time [s].
+            signals: inputs.
+            c0: leading coefficient of the step [1/s] that the order is for.
 
         Raises:
             ModelError: the equations are singular there.
         """
+        G = self.constraint_jacobian(q, v, t)[2][np.ix_(self._moving_rows, self.welds.free)]
+        found, solved = self._moving_rows[independent_rows(G).independent], self.welds.solved
+        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals, c0))
+
+    @cached_property
+    def _moving_rows(self) -> np.ndarray:
+        """Rows of constraints that see a coordinate which is solved for."""
         calls = self.layout.constraints
         moving = [calls[e] for e in moving_calls(calls, self.welds.free)]
-        rows = np.concatenate([np.arange(c.row, c.row + c.rows) for c in moving] + [np.zeros(0, int)]).astype(int)
-        G = self.constraint_jacobian(q, v, t)[2][np.ix_(rows, self.welds.free)]
-        found, solved = rows[independent_rows(G).independent], self.welds.solved
-        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals))
+        return np.concatenate([np.arange(c.row, c.row + c.rows) for c in moving] + [np.zeros(0, int)]).astype(int)
 
-    def _order(self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals) -> Tables:
+    def carried_over(self, q: np.ndarray, multipliers: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Multipliers of these independent rows, the others 0, with the force phi_q^T lam of the given ones.
+
+        Args:
+            q: position, shape (n_q,).
+            multipliers: sets of multipliers, shape (k, n_phi).
+            rows: the rows that are solved for.
+        """
+        G, carried = self.constraint_jacobian(q)[2], np.zeros_like(multipliers)
+        carried[:, rows] = np.linalg.lstsq(G[rows].T, G.T @ multipliers.T, rcond=1e-12)[0].T
+        return carried
+
+    def _order(
+        self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0
+    ) -> Tables:
         """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t."""
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
-        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t)
+        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t, c0)
         return Tables(
             dynamics, constraints, self._sensors.values, *systems, free, solved, self.second_order,
             *nominal_sizes(layout), sum(len(c.iu) > 0 for c in layout.constraints),
+            len(self._moving_rows) - len(solved), np.array([c0]),
         )  # fmt: skip
 
     def _with_orders_of(self, like: Model) -> Tables:

@@ -12,8 +12,9 @@ from dms_core.assembly.layout import GROUND_COORDINATES, Layout
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.assembly.tables import Signals, new_work
 from dms_core.compiled.arena import Packed
-from dms_core.errors import AssemblyError, ModelWarning
-from dms_core.linear.rank import independent_rows
+from dms_core.errors import AssemblyError, ModelWarning, counted
+from dms_core.linear.rank import degenerate_rows, independent_rows
+from dms_core.model.constraints.euler_norm import EulerNorm
 from dms_core.model.element import Constraint
 from dms_core.model.geometry.rotations import rotated
 
@@ -58,8 +59,8 @@ def assemble(layout: Layout, signals: Signals, jacobian: Jacobian, known: Start 
         known: start of a system of the same structure, whose independent rows are taken over.
 
     Raises:
-        AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint;
-            the latter is not looked for in what a driver moves at the start.
+        AssemblyError: a loop cannot close (constraint and gap are named), the start is a singular position, or declared
+            velocities contradict a joint; the latter is not looked for in what a driver moves at the start.
     """
     q, v = (x[: layout.n_q].copy() for x in layout.start())
     declared = q.copy()
@@ -70,6 +71,7 @@ def assemble(layout: Layout, signals: Signals, jacobian: Jacobian, known: Start 
     G = jacobian(q)[2]
     _warn_of_moved_bodies(layout, declared, q, G)
     if known is None:
+        _refuse_singular_start(layout, G, active)
         _warn_of_drivers(layout, G, len(active))
     v = _velocities(layout, jacobian, q, v)
     _start_states(layout, signals, q, v)
@@ -206,6 +208,33 @@ def _rows(layout: Layout, jacobian: Jacobian, q: np.ndarray) -> tuple[np.ndarray
         if len(other[0]) > len(active):
             active, redundant = other[:2]
     return active, redundant, singular_values
+
+
+def _refuse_singular_start(layout: Layout, G: np.ndarray, active: np.ndarray) -> None:
+    """An error where the rows lose rank at the very start: several ways lead on, and nothing tells which is meant."""
+    lost = len(active) - len(independent_rows(G).independent)
+    if lost <= 0:
+        return
+    joints = quoted(joints_of(layout, degenerate_rows(G, len(active))[1]))
+    raise AssemblyError(
+        f"system '{layout.system.name}' starts in a singular position: there {joints} leave {counted(lost, 'freedom')} "
+        "more than nearby, and which way the mechanism goes on is not determined. Declare start poses a little off it, "
+        "on the branch that is meant."
+    )
+
+
+def joints_of(layout: Layout, part: np.ndarray) -> list[str]:
+    """Names of the joints whose rows have a large part in something, part of shape (n_phi,); the largest first."""
+    joints = [c for c in layout.constraints if not isinstance(c.element, EulerNorm)]
+    parts = [(part[c.row : c.row + c.rows].max(initial=0.0), c.element.name) for c in joints]
+    ranked = sorted(parts, key=lambda x: -x[0])
+    return [name for size, name in ranked if size > ranked[0][0] / 3.0]
+
+
+def quoted(names: list[str]) -> str:
+    """The first few of the names."""
+    more = f" and {len(names) - 6} more joints" if len(names) > 6 else ""
+    return ", ".join(f"'{name}'" for name in names[:6]) + more
 
 
 def _velocities(layout: Layout, jacobian: Jacobian, q: np.ndarray, v: np.ndarray) -> np.ndarray:

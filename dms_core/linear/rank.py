@@ -57,8 +57,7 @@ def independent_rows(G: np.ndarray, tol: float = RANK_TOLERANCE) -> RowRank:
     if m == 0 or n == 0:
         none = np.zeros(0, int)
         return RowRank(none, np.arange(m), np.zeros(0), np.zeros((m, 0)))
-    length = np.linalg.norm(G, axis=1)
-    unit = G / np.where(length > 0.0, length, 1.0)[:, None]
+    length, unit = np.linalg.norm(G, axis=1), _unit(G)
     values = la.svdvals(unit)
     rank = int(np.sum(values > tol * max(values[0], 1e-300)))
     weights = 1.0 - 0.5 * np.arange(m) / m
@@ -69,6 +68,28 @@ def independent_rows(G: np.ndarray, tol: float = RANK_TOLERANCE) -> RowRank:
         combination = la.lstsq(unit[independent].T, unit[redundant].T)[0].T
         combination *= length[redundant][:, None] / length[independent][None, :]
     return RowRank(independent, redundant, values, combination)
+
+
+def degenerate_rows(G: np.ndarray, rank: int) -> tuple[float, np.ndarray]:
+    """The smallest singular value of rows that should be of this rank, and which rows share in losing it.
+
+    Args:
+        G: matrix, shape (m, n).
+        rank: what it is elsewhere, from 1 to min(m, n).
+
+    Returns:
+        Singular value number `rank` of the rows scaled to length 1, and the size of each row's part in the left
+        singular vectors of the values up to a hundred times that one, shape (m,).
+    """
+    left, values, _ = la.svd(_unit(_checked(G)), full_matrices=False)
+    small = np.flatnonzero(values[:rank] <= max(100.0 * values[rank - 1], RANK_TOLERANCE * values[0]))
+    return float(values[rank - 1]), np.linalg.norm(left[:, small], axis=1)
+
+
+def _unit(G: np.ndarray) -> np.ndarray:
+    """Rows scaled to length 1; rows of zeros stay."""
+    length = np.linalg.norm(G, axis=1)
+    return G / np.where(length > 0.0, length, 1.0)[:, None]
 
 
 def minimum_norms(G: np.ndarray, lam: np.ndarray) -> np.ndarray:

@@ -47,6 +47,10 @@ class Clock(NamedTuple):
     """Time at which inputs are evaluated."""
     worst: int
     """Largest local error over its tolerance since the last landing [-]."""
+    best_pivot: int
+    """Largest of the relative pivots of the Newton matrix since its order of elimination was chosen [-]."""
+    usual_pivot: int
+    """Largest of the relative pivots of the Newton matrix in the whole run [-]."""
 
 
 class Counts(NamedTuple):
@@ -197,9 +201,7 @@ def renumber(s):
 
 
 def with_tables(tables: Tables, state: State) -> Packed:
-    """The same world for other rows and elimination orders: it starts afresh, with multipliers 0 as their guess."""
-    state.counts[COUNTS.restart] = state.counts[COUNTS.stale] = 1
-    state.counts[COUNTS.rates_factored] = 0
-    state.lam[:], state.mu[:] = 0.0, 0.0
-    state.w.lam[:], state.w.mu[:] = 0.0, 0.0
+    """The same world, in the same motion, for other rows and elimination orders; multipliers are the caller's."""
+    state.counts[COUNTS.stale], state.counts[COUNTS.rates_factored] = 1, 0
+    state.clock[CLOCK.best_pivot] = 0.0
     return Packed(State(**{**state._asdict(), **_linear_arrays(tables)}))

@@ -1,0 +1,42 @@
+"""When the order of elimination, or the choice of independent rows, no longer fits the motion: it is then chosen anew.
+
+Both are read off numbers at hand. A pivot of the Newton matrix that has become a thousand times smaller than it was
+under the same order tells that rows which were independent where they were chosen hardly are any more (Bennett's and
+Bricard's linkages); only a model with redundant rows has others to take. An iteration that fails in a step of quite
+another size than the order was chosen for may have lost its pivots in rounding.
+"""
+
+from dms_core.assembly.tables import MODEL
+from dms_core.compiled.arena import floats, number
+from dms_core.compiled.jit import compiled
+from dms_core.simulation.state import CLOCK, STATE
+
+WEAK = 1e-2
+"""Pivot, relative to the best one under the same order, at which rows and order are chosen anew; a model whose rows are
+all needed has a choice of order only, and waits for the third power of it."""
+NEARLY_SINGULAR = 1e-3
+"""Pivot, relative to the best one of the run, at which a failed iteration is put down to a singular position."""
+OTHER_SIZE = 10.0
+"""Factor between step sizes beyond which a failed iteration may be due to the order of elimination."""
+
+
+@compiled
+def pivots_weaken(m, s):
+    """True where other rows or pivots should be taken, before the ones at hand have cost too many digits."""
+    clock = floats(s, STATE.clock)
+    limit = WEAK if number(m, MODEL.redundant) > 0 else WEAK**3
+    return clock[CLOCK.pivot] < limit * clock[CLOCK.best_pivot]
+
+
+@compiled
+def ordered_for_another_size(m, s):
+    """True where the matrix that failed belongs to a step of quite another size than the order of elimination."""
+    ratio = floats(s, STATE.clock)[CLOCK.c0_factored] / floats(m, MODEL.c0_ordered)[0]
+    return not 1.0 / OTHER_SIZE < ratio < OTHER_SIZE
+
+
+@compiled
+def nearly_singular(s):
+    """True where the matrix that failed belongs to a place at which all rows together lose rank."""
+    clock = floats(s, STATE.clock)
+    return clock[CLOCK.pivot] < NEARLY_SINGULAR * clock[CLOCK.usual_pivot]
