@@ -157,7 +157,7 @@ class Model:
         """
         G = self.constraint_jacobian(q, v, t)[2][np.ix_(self._moving_rows, self.welds.free)]
         found, solved = self._moving_rows[independent_rows(G).independent], self.welds.solved
-        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals, c0))
+        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals, c0, True))
 
     @cached_property
     def _moving_rows(self) -> np.ndarray:
@@ -179,14 +179,15 @@ class Model:
         return carried
 
     def _order(
-        self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0
-    ) -> Tables:
+        self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0,
+        quick: bool = False,
+    ) -> Tables:  # fmt: skip
         """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t."""
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
-        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t, c0)
+        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t, c0, quick)
         return Tables(
             dynamics, constraints, self._sensors.values, *systems, free, solved, self.second_order,
             *nominal_sizes(layout), sum(len(c.iu) > 0 for c in layout.constraints),

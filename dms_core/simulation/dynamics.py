@@ -155,7 +155,11 @@ class World(Inspection):
         c0 = float(clock[CLOCK.c0_factored]) or TYPICAL_C0
         place = (code, self.time, round(math.log10(c0)))
         if place in tried or (not asked and sum(p[0] == code for p in tried) >= MOST_RESCUES):
-            return asked and self._shorten()
+            usual = (code, self.time, -1)
+            if not asked or usual in tried:
+                return asked and self._shorten()
+            tried.add(usual)
+            return self.reorder() or self._shorten()
         tried.add(place)
         usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
         clock[CLOCK.best_pivot] = 0.0

@@ -1,6 +1,6 @@
 """When the order of elimination, or the choice of independent rows, no longer fits the motion: it is then chosen anew.
 
-Both are read off numbers at hand. A pivot of the Newton matrix that has become a thousand times smaller than it was
+Both are read off numbers at hand. A pivot of the Newton matrix that has become a hundred times smaller than it was
 under the same order tells that rows which were independent where they were chosen hardly are any more (Bennett's and
 Bricard's linkages); only a model with redundant rows has others to take. An iteration that fails in a step of quite
 another size than the order was chosen for may have lost its pivots in rounding.
@@ -12,8 +12,9 @@ from dms_core.compiled.jit import compiled
 from dms_core.simulation.state import CLOCK, STATE
 
 WEAK = 1e-2
-"""Pivot, relative to the best one under the same order, at which rows and order are chosen anew; a model whose rows are
-all needed has a choice of order only, and waits for the third power of it."""
+"""Pivot, over the best one under the same order, at which a model with redundant rows has them chosen anew."""
+LOST = 1e-6
+"""The same for a model that needs all its rows, and has a choice of the order only."""
 NEARLY_SINGULAR = 1e-3
 """Pivot, relative to the best one of the run, at which a failed iteration is put down to a singular position."""
 OTHER_SIZE = 10.0
@@ -24,7 +25,7 @@ OTHER_SIZE = 10.0
 def pivots_weaken(m, s):
     """True where other rows or pivots should be taken, before the ones at hand have cost too many digits."""
     clock = floats(s, STATE.clock)
-    limit = WEAK if number(m, MODEL.redundant) > 0 else WEAK**3
+    limit = WEAK if number(m, MODEL.redundant) > 0 else LOST
     return clock[CLOCK.pivot] < limit * clock[CLOCK.best_pivot]
 
 
