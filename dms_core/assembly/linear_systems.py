@@ -75,6 +75,9 @@ class LinearSystem:
             samples: entries at the start, then at nearby states.
             quick: see symbolic.plan.
         """
+        if quick:
+            # Chosen for here and now; where entries vanish later its pivots weaken, and it is chosen anew.
+            samples = samples[:1]
         least = np.min(np.abs(samples), axis=0)
         best, found, problem = -1.0, None, None
         for sample, threshold in product(samples, THRESHOLDS):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
 from dms_core.assembly.sensing import SENSING_CODE, composition, measure, new_sensing
+from dms_core.assembly.sparse_constraints import SparseConstraints
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
 from dms_core.compiled import side_by_side
@@ -23,9 +25,13 @@ from dms_core.compiled.arena import Packed
 from dms_core.compiled.compilation import announce
 from dms_core.compiled.entries import all_calls, moving_calls
 from dms_core.errors import ModelError, ModelWarning, choices
-from dms_core.linear.rank import independent_rows, minimum_norms
+from dms_core.linear.rank import independent_rows, minimum_norms, multipliers_of
 from dms_core.model.system import System
 
+SPARSE_ROWS = 500
+"""Rows of phi_q up to which dense methods are quicker, and tell the rank more sharply."""
+MOVED_TOLERANCE = 1e-6
+"""Share of the largest singular value below which a row that was redundant at the start still is, along the motion."""
 BATCH = 256
 """States whose multipliers are made unique at a time."""
 
@@ -82,11 +88,11 @@ class Model:
         rows_of = known.start if known is not None and reuse_rows else None
         q, v = layout.start()
         check_finite(layout, self.open_call(q[: self.n_q], v[: self.n_q], constraints_only=True))
-        self.start: Start = assemble(layout, self._signals, self.constraint_jacobian, rows_of)
+        self.start: Start = assemble(layout, self._signals, self.jacobian, rows_of)
         if known is not None and not np.array_equal(self.start.active, known.start.active):
             known = None
         check_finite(layout, self.open_call(self.start.q, self.start.v))
-        self._welds = Packed(find_welds(layout, self.start.active, self.constraint_jacobian(self.start.q)[2]))
+        self._welds = Packed(find_welds(layout, self.start.active, self.jacobian(self.start.q)[2]))
         self.start.v[self.welds.coordinates] = 0.0
         if known:
             self._tables = Packed(self._with_orders_of(known))
@@ -155,9 +161,10 @@ class Model:
         Raises:
             ModelError: the equations are singular there.
         """
-        G = self.constraint_jacobian(q, v, t)[2][np.ix_(self._moving_rows, self.welds.free)]
-        found, solved = self._moving_rows[independent_rows(G).independent], self.welds.solved
-        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals, c0, True))
+        G = self.jacobian(q, v, t)[2][self._moving_rows][:, self.welds.free]
+        # Along the motion rows are closed to a tolerance only, within which those that depend on others seem not to.
+        found = self._moving_rows[independent_rows(G, MOVED_TOLERANCE, len(self.welds.solved)).independent]
+        return Packed(self._order(found, q, v, t, signals, c0, True))
 
     @cached_property
     def _moving_rows(self) -> np.ndarray:
@@ -174,8 +181,8 @@ class Model:
             multipliers: sets of multipliers, shape (k, n_phi).
             rows: the rows that are solved for.
         """
-        G, carried = self.constraint_jacobian(q)[2], np.zeros_like(multipliers)
-        carried[:, rows] = np.linalg.lstsq(G[rows].T, G.T @ multipliers.T, rcond=1e-12)[0].T
+        G, carried = self.jacobian(q)[2], np.zeros_like(multipliers)
+        carried[:, rows] = multipliers_of(G[rows], (G.T @ multipliers.T).T)
         return carried
 
     def _order(
@@ -233,6 +240,22 @@ class Model:
         G, W = np.zeros((self.n_phi, self.n_q + 7)), np.zeros((self.n_phi, self.n_q + 7))
         dense_constraints(self._constraints.table, packed.table, G, W)
         return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]
+
+    def jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[Any, ...]:
+        """As `constraint_jacobian`; for more than SPARSE_ROWS rows phi_q is a CSR array, and (phi_q v)_q is None."""
+        if self.n_phi <= SPARSE_ROWS:
+            return self.constraint_jacobian(q, v, t)
+        w = self.new_work()
+        w.q[: self.n_q] = q
+        w.v[: self.n_q] = 0.0 if v is None else v
+        packed = Packed(w)
+        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
+        G = self._sparse_constraints(w, packed)
+        return w.phi.copy(), w.phi_v.copy(), G, None
+
+    @cached_property
+    def _sparse_constraints(self) -> SparseConstraints:
+        return SparseConstraints(self.layout, self._constraints)
 
     def unique_multipliers(self, q: np.ndarray, lam: np.ndarray) -> np.ndarray:
         """The least-norm multipliers of the same constraint force phi_q^T lam, shapes (k, n_q) and (k, n_phi).

@@ -20,7 +20,7 @@ from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.failure import explain, singular_joints
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
-from dms_core.simulation.order_watch import WEAK
+from dms_core.simulation.order_watch import WEAK, ordered_for_another_size
 from dms_core.simulation.parts import SINGULAR_PIVOT, advance, restart
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
@@ -154,6 +154,11 @@ class World(Inspection):
         clock, asked = self.state.clock, code == OUTCOME.matrix_singular
         c0 = float(clock[CLOCK.c0_factored]) or TYPICAL_C0
         place = (code, self.time, round(math.log10(c0)))
+        usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
+        watched = usable and not ordered_for_another_size(self._tables.table, self._world.table)
+        if place in tried and watched:
+            clock[CLOCK.best_pivot] = 0.0
+            return True
         if place in tried or (not asked and sum(p[0] == code for p in tried) >= MOST_RESCUES):
             usual = (code, self.time, -1)
             if not asked or usual in tried:
@@ -161,9 +166,8 @@ class World(Inspection):
             tried.add(usual)
             return self.reorder() or self._shorten()
         tried.add(place)
-        usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
         clock[CLOCK.best_pivot] = 0.0
-        if usable and singular_joints(self.model, self.state.q, self.time)[0]:
+        if watched and singular_joints(self.model, self.state.q, self.time)[0]:
             # No choice of rows or pivots is a good one here, and one that is made here is none for later.
             clock[CLOCK.best_pivot] = LOOK_AGAIN * clock[CLOCK.pivot] / WEAK
             return True

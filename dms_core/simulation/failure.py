@@ -31,10 +31,10 @@ def singular_joints(model: Model, q: np.ndarray, t: float) -> tuple[list[str], f
         of rows of length 1.
     """
     rank, start = len(model.start.active), model.start.singular_values
-    usual = float(start[rank - 1]) if 0 < rank <= len(start) else 0.0
+    usual = float(start[min(rank, len(start)) - 1]) if rank and len(start) else 0.0
     if not (usual > 0.0 and np.isfinite(q).all()):
         return [], 0.0, usual
-    smallest, part = degenerate_rows(model.constraint_jacobian(q, None, t)[2], rank)
+    smallest, part = degenerate_rows(model.jacobian(q, None, t)[2], rank)
     return joints_of(model.layout, part) if smallest < NEAR_SINGULAR * usual else [], smallest, usual
 
 
