@@ -25,14 +25,20 @@ the derivative is wrong, over the sum of the sizes of its terms."""
 
 
 @compiled
-def _shift(x, e, n, which, side):
-    """Move q, v or vdot (0, 1, 2) of call e to a side by one step; alternate signs make the direction a general one."""
+def _choose_steps(x, e, n, which, values):
+    """Present q, v or vdot (0, 1, 2) of call e, and steps from it, whose signs and sizes make a general direction."""
+    y = x.q if which == 0 else (x.v if which == 1 else x.a)
     for i in range(n):
-        k = x.iq[x.iq_ptr[e] + i]
-        y = x.q if which == 0 else (x.v if which == 1 else x.a)
-        step = STEP * (1.0 + abs(y[k])) * (1.0 - 0.37 * (i % 3)) * (1.0 if i % 2 == 0 else -1.0)
-        y[k] += side * step
-        x.q_l[i] = step
+        values[5, i] = y[x.iq[x.iq_ptr[e] + i]]
+        values[6, i] = STEP * (1.0 + abs(values[5, i])) * (1.0 - 0.37 * (i % 3)) * (1.0 if i % 2 == 0 else -1.0)
+
+
+@compiled
+def _put(x, e, n, which, values, side):
+    """q, v or vdot of call e at the present value (0) or at one step to a side (1, -1)."""
+    y = x.q if which == 0 else (x.v if which == 1 else x.a)
+    for i in range(n):
+        y[x.iq[x.iq_ptr[e] + i]] = values[5, i] + side * values[6, i]
 
 
 @compiled
@@ -47,7 +53,7 @@ def _contradicts(forward, backward, middle, slope, terms):
 
 @compiled
 def first_wrong_dynamic(calls, w, values):
-    """First dynamic call whose Jq, Jv or Ja contradicts its rows; -1 if none. `values`: scratch, (5, local size)."""
+    """First dynamic call whose Jq, Jv or Ja contradicts its rows; -1 if none. `values`: scratch, (7, local size)."""
     x = views(calls, w)
     for e in range(x.kernel.shape[0]):
         for which in range(3):
@@ -55,18 +61,18 @@ def first_wrong_dynamic(calls, w, values):
             block = matrix(w, WORK.Jq) if which == 0 else (matrix(w, WORK.Jv) if which == 1 else matrix(w, WORK.Ja))
             for i in range(n):
                 values[0, i] = x.r_l[i]
-            _shift(x, e, n, which, 0.0)
+            _choose_steps(x, e, n, which, values)
             for i in range(n):
                 values[3, i] = values[4, i] = 0.0
                 for j in range(n):
-                    values[3, i] += block[i, j] * x.q_l[j]
-                    values[4, i] += abs(block[i, j] * x.q_l[j])
+                    values[3, i] += block[i, j] * values[6, j]
+                    values[4, i] += abs(block[i, j] * values[6, j])
             for side in range(2):
-                _shift(x, e, n, which, 1.0 if side == 0 else -2.0)
+                _put(x, e, n, which, values, 1.0 if side == 0 else -1.0)
                 evaluate_dynamic(x, calls, e, w, 0)
                 for i in range(n):
                     values[1 + side, i] = x.r_l[i]
-            _shift(x, e, n, which, 1.0)
+            _put(x, e, n, which, values, 0.0)
             for i in range(n):
                 if _contradicts(values[1, i], values[2, i], values[0, i], values[3, i], values[4, i]):
                     return e
@@ -81,18 +87,18 @@ def first_wrong_constraint(calls, w, values):
         n, m = evaluate_constraint(x, calls, e, w, 1), x.row[e + 1] - x.row[e]
         for i in range(m):
             values[0, i] = x.phi_l[i]
-        _shift(x, e, n, 0, 0.0)
+        _choose_steps(x, e, n, 0, values)
         for i in range(m):
             values[3, i] = values[4, i] = 0.0
             for j in range(n):
-                values[3, i] += x.G[i, j] * x.q_l[j]
-                values[4, i] += abs(x.G[i, j] * x.q_l[j])
+                values[3, i] += x.G[i, j] * values[6, j]
+                values[4, i] += abs(x.G[i, j] * values[6, j])
         for side in range(2):
-            _shift(x, e, n, 0, 1.0 if side == 0 else -2.0)
+            _put(x, e, n, 0, values, 1.0 if side == 0 else -1.0)
             evaluate_constraint(x, calls, e, w, 0)
             for i in range(m):
                 values[1 + side, i] = x.phi_l[i]
-        _shift(x, e, n, 0, 1.0)
+        _put(x, e, n, 0, values, 0.0)
         for i in range(m):
             if _contradicts(values[1, i], values[2, i], values[0, i], values[3, i], values[4, i]):
                 return e
@@ -101,7 +107,7 @@ def first_wrong_constraint(calls, w, values):
 
 def wrong_call(layout: Layout, dynamics: np.ndarray, constraints: np.ndarray, w: Packed) -> Call | None:
     """The first call whose derivatives contradict its equations at the state in the work arrays; else None."""
-    values = np.zeros((5, len(w.values.q_l)))
+    values = np.zeros((7, len(w.values.q_l)))
     e = first_wrong_constraint(constraints, w.table, values)
     if e >= 0:
         return layout.constraints[e]
