@@ -20,7 +20,7 @@ from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.failure import explain, singular_joints
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
-from dms_core.simulation.order_watch import WEAK, ordered_for_another_size
+from dms_core.simulation.order_watch import LEFT_BEHIND, WEAK, ordered_for_another_size
 from dms_core.simulation.parts import SINGULAR_PIVOT, advance, restart
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
@@ -166,10 +166,14 @@ class World(Inspection):
             tried.add(usual)
             return self.reorder() or self._shorten()
         tried.add(place)
+        weak = clock[CLOCK.pivot] < WEAK * clock[CLOCK.best_pivot]
         clock[CLOCK.best_pivot] = 0.0
         if watched and singular_joints(self.model, self.state.q, self.time)[0]:
             # No choice of rows or pivots is a good one here, and one that is made here is none for later.
             clock[CLOCK.best_pivot] = LOOK_AGAIN * clock[CLOCK.pivot] / WEAK
+            clock[CLOCK.singular_pivot] = LEFT_BEHIND * clock[CLOCK.pivot]
+            return True
+        if watched and not weak:
             return True
         if code == OUTCOME.rates_failed:
             self.state.counts[COUNTS.restart] = 1

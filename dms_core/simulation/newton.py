@@ -11,7 +11,7 @@ from typing import NamedTuple
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import fields, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.order_watch import nearly_singular
+from dms_core.simulation.order_watch import LEFT_BEHIND, nearly_singular
 from dms_core.simulation.parts import PARTS, SINGULAR_PIVOT, run_part
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
 
@@ -107,7 +107,8 @@ def refresh(m, s, c0):
     clock[CLOCK.contraction] = 0.0
     run_part(m, s, PARTS.newton_matrix)
     clock[CLOCK.best_pivot] = max(clock[CLOCK.best_pivot], clock[CLOCK.pivot])
-    clock[CLOCK.usual_pivot] = max(clock[CLOCK.usual_pivot], clock[CLOCK.pivot])
+    if clock[CLOCK.pivot] > LEFT_BEHIND * clock[CLOCK.singular_pivot]:
+        clock[CLOCK.singular_pivot] = 0.0
     return clock[CLOCK.pivot] > SINGULAR_PIVOT
 
 

@@ -15,8 +15,10 @@ WEAK = 1e-2
 """Pivot, over the best one under the same order, at which a model with redundant rows has them chosen anew."""
 LOST = 1e-6
 """The same for a model that needs all its rows, and has a choice of the order only."""
-NEARLY_SINGULAR = 1e-3
-"""Pivot, relative to the best one of the run, at which a failed iteration is put down to a singular position."""
+SUSPECT = 1e-3
+"""Pivot, over the best one under the same order, at which steps that fail ask whether the position is singular."""
+LEFT_BEHIND = 10.0
+"""Pivot, over the one below which a position counts as nearly singular, at which that is over."""
 OTHER_SIZE = 10.0
 """Factor between step sizes beyond which a failed iteration may be due to the order of elimination."""
 
@@ -38,6 +40,15 @@ def ordered_for_another_size(m, s):
 
 @compiled
 def nearly_singular(s):
-    """True where the matrix that failed belongs to a place at which all rows together lose rank."""
+    """True where all rows together lose rank, as the singular values at the last weak pivot have told."""
     clock = floats(s, STATE.clock)
-    return clock[CLOCK.pivot] < NEARLY_SINGULAR * clock[CLOCK.usual_pivot]
+    return clock[CLOCK.pivot] < clock[CLOCK.singular_pivot]
+
+
+@compiled
+def may_be_singular(m, s):
+    """True where a step that fails again and again may do so for the position, which is to be looked at."""
+    clock = floats(s, STATE.clock)
+    # With redundant rows the best pivot is forgotten too often, as rows are chosen anew, to tell anything.
+    suspect = number(m, MODEL.redundant) > 0 or clock[CLOCK.pivot] < SUSPECT * clock[CLOCK.best_pivot]
+    return suspect and not nearly_singular(s)

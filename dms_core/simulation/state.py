@@ -49,8 +49,8 @@ class Clock(NamedTuple):
     """Largest local error over its tolerance since the last landing [-]."""
     best_pivot: int
     """Largest of the relative pivots of the Newton matrix since its order of elimination was chosen [-]."""
-    usual_pivot: int
-    """Largest of the relative pivots of the Newton matrix in the whole run [-]."""
+    singular_pivot: int
+    """Relative pivot below which the position is known to be nearly singular; 0 where it is regular [-]."""
 
 
 class Counts(NamedTuple):
@@ -203,5 +203,5 @@ def renumber(s):
 def with_tables(tables: Tables, state: State) -> Packed:
     """The same world, in the same motion, for other rows and elimination orders; multipliers are the caller's."""
     state.counts[COUNTS.stale], state.counts[COUNTS.rates_factored] = 1, 0
-    state.clock[CLOCK.best_pivot] = 0.0
+    state.clock[CLOCK.best_pivot] = state.clock[CLOCK.singular_pivot] = 0.0
     return Packed(State(**{**state._asdict(), **_linear_arrays(tables)}))

@@ -14,7 +14,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.simulation.bdf2 import bdf2_step
 from dms_core.simulation.implicit_stage import set_weights
 from dms_core.simulation.newton import MAX_ITERATIONS, NEWTON, note_errors
-from dms_core.simulation.order_watch import nearly_singular, ordered_for_another_size, pivots_weaken
+from dms_core.simulation.order_watch import may_be_singular, nearly_singular, ordered_for_another_size, pivots_weaken
 from dms_core.simulation.parts import PARTS, run_rates, set_inputs
 from dms_core.simulation.sdirk2 import GAMMA, sdirk2_step
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
@@ -39,6 +39,8 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
+HELP = 3
+"""Failed attempts at a step after which order and position are looked at."""
 LEAPS = (1.5, 2.3, 3.1, 4.2)
 """Longer steps, over the one that failed, that are tried across a singular position."""
 SINGULAR_ERROR = 100.0
@@ -181,16 +183,18 @@ def one_step(m, s, o, stop, kept):
             return OUTCOME.matrix_singular
         if code == NEWTON.converged and (error <= (SINGULAR_ERROR if nearly_singular(s) else 1.0) or fixed):
             break
+        failures += 1
+        if (code != NEWTON.converged and (fixed or failures > 1) and ordered_for_another_size(m, s)) or (
+            failures == HELP and not fixed and may_be_singular(m, s)
+        ):
+            clock[CLOCK.h_wanted] = h
+            return OUTCOME.matrix_singular
         if code == NEWTON.converged:
             count[COUNTS.rejected_error] += 1
             wanted = h * max(SHRINK, min(0.9, SAFETY * error ** (-1.0 / 3.0)))
         else:
             count[COUNTS.rejected_newton] += 1
             count[COUNTS.stale] = 1
-            failures += 1
-            if (fixed or failures > 1) and ordered_for_another_size(m, s):
-                clock[CLOCK.h_wanted] = h
-                return OUTCOME.matrix_singular
             wanted = 0.25 * h
             # Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
             if first_try and o.one_step == 1:
