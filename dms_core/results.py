@@ -21,12 +21,16 @@ class Result(Enum):
 
     SUCCESS = "The run reached its end time."
     STEP_TOO_SMALL = "The error test asked for a step below the smallest allowed one; loosen rtol or look for a discontinuity that no input table declares."  # noqa: E501
-    NEWTON_FAILED = "Newton's method did not converge: take a smaller fixed step, or, under error control, look for a force whose derivatives are wrong."  # noqa: E501
-    MATRIX_SINGULAR = "The Newton matrix is singular: the mechanism is in a singular position or a body has no inertia along a free direction."  # noqa: E501
-    TOO_MANY_STEPS = "The largest number of steps was used up before the end time; raise max_steps or loosen rtol."
-    RATES_FAILED = (
-        "No accelerations and multipliers satisfy the equations at a start or jump; look for an input far out of range."  # noqa: E501
+    NEWTON_FAILED = (
+        "Newton's method did not converge at any step size that is allowed: take a smaller fixed step or h_min."
     )
+    MATRIX_SINGULAR = "The Newton matrix is singular: the equations determine not everything that moves."
+    SINGULAR_POSITION = (
+        "The mechanism has come to a singular position: rounding would decide on which branch it goes on. A step that "
+        "passes it needs a looser rtol; otherwise remove the branch, as by slightly other lengths."
+    )
+    TOO_MANY_STEPS = "The largest number of steps was used up before the end time; raise max_steps or loosen rtol."
+    RATES_FAILED = "No accelerations and multipliers satisfy the equations at a start or jump."
     INTERRUPTED = "The run was interrupted by the user; what was computed before is complete."
 
 

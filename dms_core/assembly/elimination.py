@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 
 from dms_core.assembly.layout import Layout
 from dms_core.assembly.residual import evaluate_residual
@@ -42,7 +43,7 @@ class Welds(NamedTuple):
 WELDS = fields(Welds)
 
 
-def find_welds(layout: Layout, active: np.ndarray, G: np.ndarray) -> Welds:
+def find_welds(layout: Layout, active: np.ndarray, G: np.ndarray | sp.csr_array) -> Welds:
     """Bodies that are fixed to the ground; none where joints do not hold them exactly once, or where all are fixed.
 
     Args:
@@ -63,7 +64,8 @@ def find_welds(layout: Layout, active: np.ndarray, G: np.ndarray) -> Welds:
     rows = rows[np.isin(rows, active)]
     if len(rows) != len(welded) or len(welded) == layout.n_q or any(len(c.iu) for c in among):
         return none
-    inverse = np.linalg.inv(G[np.ix_(rows, welded)].T)
+    block = G[rows][:, welded]
+    inverse = np.linalg.inv((block.toarray() if sp.issparse(block) else block).T)
     solved = np.setdiff1d(active, rows)
     return Welds(
         np.setdiff1d(free, welded).astype(np.int32), solved.astype(np.int32), welded.astype(np.int32),

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from pydantic import BaseModel
 
 from dms_core.assembly.layout import Call, Layout
 from dms_core.assembly.local import evaluate_constraint, evaluate_dynamic, views
@@ -20,6 +21,8 @@ from dms_core.validation import numbers_in
 
 NAMED = 3
 """Numbers that a sentence names: those farthest from 1."""
+ROUNDED = 1e-12
+"""Component of a vector, over its largest one, that is a rounded zero: never why equations fail."""
 FAR = 9
 """Powers of ten from 1 at which a number is named where equations fail without telling why."""
 
@@ -96,11 +99,19 @@ def far_numbers(system: System) -> str:
     found = [
         (x, f"{key} = {x} of {element.kind} '{element.name}'")
         for element in system.everything()
-        for key, x in numbers_in(element)
-        if x != 0.0 and not 10.0**-FAR < abs(x) < 10.0**FAR
+        for key, x, size in _sized_numbers(element)
+        if abs(x) > ROUNDED * size and not 10.0**-FAR < abs(x) < 10.0**FAR
     ]
     most = _farthest_from_1(found)
     return f" Look at numbers far from 1 in SI units: {most}." if most else ""
+
+
+def _sized_numbers(element: BaseModel) -> Iterator[tuple[str, float, float]]:
+    """Every number of a declaration, by its keys, with the largest size in its vector."""
+    found = list(numbers_in(element))
+    for key, x in found:
+        vector = key.rpartition(".")[0]
+        yield key, x, max((abs(y) for k, y in found if k.rpartition(".")[0] == vector and vector), default=0.0)
 
 
 def _farthest_from_1(found: list[tuple[float, str]]) -> str:

@@ -23,7 +23,7 @@ from dms_core.linear.ordering import SingularMatrixError
 from dms_core.linear.symbolic import LuTables, plan
 
 TYPICAL_C0 = 1.5e3
-"""c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen."""
+"""c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen first."""
 
 NEARBY_STATES, NEARBY = 6, 0.1
 """Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
@@ -48,14 +48,14 @@ class LinearSystem:
     columns: np.ndarray
     names: list[str]
 
-    def ordered(self, values: np.ndarray, threshold: float) -> tuple[Any, LuTables]:
+    def ordered(self, values: np.ndarray, threshold: float, quick: bool) -> tuple[Any, LuTables]:
         """(scatter into the LU, LU tables) for an elimination order chosen by these values.
 
         Raises:
             ModelError: the matrix is singular; names the unknowns that nothing determines.
         """
         try:
-            lu = plan(len(self.names), self.rows, self.columns, values, threshold=threshold)
+            lu = plan(len(self.names), self.rows, self.columns, values, threshold=threshold, quick=quick)
         except SingularMatrixError as error:
             names = ", ".join(f"'{self.names[k]}'" for k in error.columns[:4])
             raise ModelError(
@@ -64,7 +64,7 @@ class LinearSystem:
             ) from error
         return moved(self.pattern, lu.position), lu
 
-    def best_order(self, samples: list[np.ndarray]) -> tuple[Any, LuTables]:
+    def best_order(self, samples: list[np.ndarray], quick: bool) -> tuple[Any, LuTables]:
         """As `ordered`, with the order whose smallest relative pivot over all samples is the largest.
 
         An entry that is large at the start and zero later (a saturated command, a slack tendon) must not become a
@@ -73,13 +73,17 @@ class LinearSystem:
 
         Args:
             samples: entries at the start, then at nearby states.
+            quick: see symbolic.plan.
         """
+        if quick:
+            # Chosen for here and now; where entries vanish later its pivots weaken, and it is chosen anew.
+            samples = samples[:1]
         least = np.min(np.abs(samples), axis=0)
         best, found, problem = -1.0, None, None
         for sample, threshold in product(samples, THRESHOLDS):
             values = np.where(least < VANISHING * np.abs(sample), np.copysign(least, sample), sample)
             try:
-                candidate = self.ordered(values, threshold)
+                candidate = self.ordered(values, threshold, quick)
             except ModelError as error:
                 problem = error
                 continue
@@ -122,8 +126,13 @@ class Sampling(NamedTuple):
     """Coordinates and independent constraint rows that are solved for."""
 
 
-def ordered_systems(where: Sampling, q: np.ndarray, v: np.ndarray, t: float) -> OrderedSystems:
+def ordered_systems(
+    where: Sampling, q: np.ndarray, v: np.ndarray, t: float, c0: float = TYPICAL_C0, quick: bool = False
+) -> OrderedSystems:
     """Scatter and elimination orders of both systems, from their values at and near q, v, shape (n_q,), at time t.
+
+    The Newton matrix depends on c0 [1/s] too: in a short step masses outweigh dampers and springs, in a long one the
+    other way round, and what is a good pivot in one may be lost in rounding in the other.
 
     Raises:
         ModelError: the equations are singular there; names the unknowns that nothing determines.
@@ -141,14 +150,14 @@ def ordered_systems(where: Sampling, q: np.ndarray, v: np.ndarray, t: float) -> 
         newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
     ).best_order(_samples(
         layout, work, free, len(slots.number),
-        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, TYPICAL_C0, x),
-    ))  # fmt: skip
+        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, c0, x),
+    ), quick)  # fmt: skip
     rates, slots = rate_pattern(layout, free, solved)
     packed_rates = Packed(rates)
     rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*moving, *rows]).best_order(_samples(
         layout, work, free, len(slots.number),
         lambda x: evaluate_rates(dynamics.table, constraints.table, packed_rates.table, w.table, x),
-    ))  # fmt: skip
+    ), quick)  # fmt: skip
     return OrderedSystems(newton, newton_lu, rates, rate_lu)
 
 

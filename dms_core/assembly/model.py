@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +12,12 @@ from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
 from dms_core.assembly.layout import Call, Layout, same_structure
-from dms_core.assembly.linear_systems import Sampling, nominal_sizes, ordered_systems
+from dms_core.assembly.linear_systems import TYPICAL_C0, Sampling, nominal_sizes, ordered_systems
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
 from dms_core.assembly.sensing import SENSING_CODE, composition, measure, new_sensing
+from dms_core.assembly.sparse_constraints import SparseConstraints
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
 from dms_core.compiled import side_by_side
@@ -23,9 +25,13 @@ from dms_core.compiled.arena import Packed
 from dms_core.compiled.compilation import announce
 from dms_core.compiled.entries import all_calls, moving_calls
 from dms_core.errors import ModelError, ModelWarning, choices
-from dms_core.linear.rank import independent_rows, minimum_norms
+from dms_core.linear.rank import independent_rows, minimum_norms, multipliers_of
 from dms_core.model.system import System
 
+SPARSE_ROWS = 500
+"""Rows of phi_q up to which dense methods are quicker, and tell the rank more sharply."""
+MOVED_TOLERANCE = 1e-6
+"""Share of the largest singular value below which a row that was redundant at the start still is, along the motion."""
 BATCH = 256
 """States whose multipliers are made unique at a time."""
 
@@ -82,11 +88,11 @@ class Model:
         rows_of = known.start if known is not None and reuse_rows else None
         q, v = layout.start()
         check_finite(layout, self.open_call(q[: self.n_q], v[: self.n_q], constraints_only=True))
-        self.start: Start = assemble(layout, self._signals, self.constraint_jacobian, rows_of)
+        self.start: Start = assemble(layout, self._signals, self.jacobian, rows_of)
         if known is not None and not np.array_equal(self.start.active, known.start.active):
             known = None
         check_finite(layout, self.open_call(self.start.q, self.start.v))
-        self._welds = Packed(find_welds(layout, self.start.active, self.constraint_jacobian(self.start.q)[2]))
+        self._welds = Packed(find_welds(layout, self.start.active, self.jacobian(self.start.q)[2]))
         self.start.v[self.welds.coordinates] = 0.0
         if known:
             self._tables = Packed(self._with_orders_of(known))
@@ -142,29 +148,57 @@ class Model:
         """Constant tables (a packed Tables) for the compiled solver."""
         return self._tables
 
-    def reordered(self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals) -> Packed:
-        """Tables with independent rows and elimination orders chosen anew at q, v, shape (n_q,), and those inputs.
+    def reordered(self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0) -> Packed:
+        """Tables with independent rows and elimination orders chosen anew at a state.
+
+        Args:
+            q: position, shape (n_q,).
+            v: velocity, shape (n_q,).
+            t: time [s].
+            signals: inputs.
+            c0: leading coefficient of the step [1/s] that the order is for.
 
         Raises:
             ModelError: the equations are singular there.
         """
+        G = self.jacobian(q, v, t)[2][self._moving_rows][:, self.welds.free]
+        # Along the motion rows are closed to a tolerance only, within which those that depend on others seem not to.
+        found = self._moving_rows[independent_rows(G, MOVED_TOLERANCE, len(self.welds.solved)).independent]
+        return Packed(self._order(found, q, v, t, signals, c0, True))
+
+    @cached_property
+    def _moving_rows(self) -> np.ndarray:
+        """Rows of constraints that see a coordinate which is solved for."""
         calls = self.layout.constraints
         moving = [calls[e] for e in moving_calls(calls, self.welds.free)]
-        rows = np.concatenate([np.arange(c.row, c.row + c.rows) for c in moving] + [np.zeros(0, int)]).astype(int)
-        G = self.constraint_jacobian(q, v, t)[2][np.ix_(rows, self.welds.free)]
-        found, solved = rows[independent_rows(G).independent], self.welds.solved
-        return Packed(self._order(found if len(found) >= len(solved) else solved, q, v, t, signals))
+        return np.concatenate([np.arange(c.row, c.row + c.rows) for c in moving] + [np.zeros(0, int)]).astype(int)
 
-    def _order(self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals) -> Tables:
+    def carried_over(self, q: np.ndarray, multipliers: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Multipliers of these independent rows, the others 0, with the force phi_q^T lam of the given ones.
+
+        Args:
+            q: position, shape (n_q,).
+            multipliers: sets of multipliers, shape (k, n_phi).
+            rows: the rows that are solved for.
+        """
+        G, carried = self.jacobian(q)[2], np.zeros_like(multipliers)
+        carried[:, rows] = multipliers_of(G[rows], (G.T @ multipliers.T).T)
+        return carried
+
+    def _order(
+        self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0,
+        quick: bool = False,
+    ) -> Tables:  # fmt: skip
         """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t."""
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
-        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t)
+        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t, c0, quick)
         return Tables(
             dynamics, constraints, self._sensors.values, *systems, free, solved, self.second_order,
             *nominal_sizes(layout), sum(len(c.iu) > 0 for c in layout.constraints),
+            len(self._moving_rows) - len(solved), np.array([c0]),
         )  # fmt: skip
 
     def _with_orders_of(self, like: Model) -> Tables:
@@ -206,6 +240,22 @@ class Model:
         G, W = np.zeros((self.n_phi, self.n_q + 7)), np.zeros((self.n_phi, self.n_q + 7))
         dense_constraints(self._constraints.table, packed.table, G, W)
         return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]
+
+    def jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[Any, ...]:
+        """As `constraint_jacobian`; for more than SPARSE_ROWS rows phi_q is a CSR array, and (phi_q v)_q is None."""
+        if self.n_phi <= SPARSE_ROWS:
+            return self.constraint_jacobian(q, v, t)
+        w = self.new_work()
+        w.q[: self.n_q] = q
+        w.v[: self.n_q] = 0.0 if v is None else v
+        packed = Packed(w)
+        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
+        G = self._sparse_constraints(w, packed)
+        return w.phi.copy(), w.phi_v.copy(), G, None
+
+    @cached_property
+    def _sparse_constraints(self) -> SparseConstraints:
+        return SparseConstraints(self.layout, self._constraints)
 
     def unique_multipliers(self, q: np.ndarray, lam: np.ndarray) -> np.ndarray:
         """The least-norm multipliers of the same constraint force phi_q^T lam, shapes (k, n_q) and (k, n_phi).

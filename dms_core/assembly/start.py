@@ -12,8 +12,9 @@ from dms_core.assembly.layout import GROUND_COORDINATES, Layout
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.assembly.tables import Signals, new_work
 from dms_core.compiled.arena import Packed
-from dms_core.errors import AssemblyError, ModelWarning
-from dms_core.linear.rank import independent_rows
+from dms_core.errors import AssemblyError, ModelWarning, counted
+from dms_core.linear.rank import degenerate_rows, independent_rows, least_norm
+from dms_core.model.constraints.euler_norm import EulerNorm
 from dms_core.model.element import Constraint
 from dms_core.model.geometry.rotations import rotated
 
@@ -58,8 +59,8 @@ def assemble(layout: Layout, signals: Signals, jacobian: Jacobian, known: Start 
         known: start of a system of the same structure, whose independent rows are taken over.
 
     Raises:
-        AssemblyError: a loop cannot close (constraint and gap are named), or declared velocities contradict a joint;
-            the latter is not looked for in what a driver moves at the start.
+        AssemblyError: a loop cannot close (constraint and gap are named), the start is a singular position, or declared
+            velocities contradict a joint; the latter is not looked for in what a driver moves at the start.
     """
     q, v = (x[: layout.n_q].copy() for x in layout.start())
     declared = q.copy()
@@ -83,7 +84,7 @@ def _closed(layout: Layout, jacobian: Jacobian, q: np.ndarray, name: str) -> np.
     for _ in range(MAX_ITERATIONS):
         if size < TOLERANCE:
             break
-        step = np.linalg.lstsq(G, phi, rcond=1e-10)[0]
+        step = least_norm(G, phi)
         for shorter in 0.5 ** np.arange(8):
             trial = q - shorter * step
             phi_t, _, G_t, _ = jacobian(trial)
@@ -114,7 +115,7 @@ def _warn_of_moved_bodies(layout: Layout, declared: np.ndarray, q: np.ndarray, G
 
     Where a driver moves a mechanism its declared start is a guess, and nothing is said.
     """
-    linked, far = np.any(G[_linked(G, _driver_rows(layout))] != 0.0, axis=0), []
+    linked, far = abs(G[_linked(G, _driver_rows(layout))]).sum(axis=0) > 0.0, []
     for body in layout.system.bodies:
         k = layout.offset[body.name]
         if not linked[k : k + len(body.coordinates())].any():
@@ -196,7 +197,7 @@ def _rows(layout: Layout, jacobian: Jacobian, q: np.ndarray) -> tuple[np.ndarray
     if len(redundant) == 0:
         return active, redundant, singular_values
     freedom = np.random.default_rng(0).normal(size=layout.n_q)
-    freedom -= np.linalg.lstsq(G, G @ freedom, rcond=1e-10)[0]
+    freedom -= least_norm(G, G @ freedom)
     if np.linalg.norm(freedom) > 1e-9:
         try:
             near = _closed(layout, jacobian, q + 1e-2 * freedom / np.linalg.norm(freedom), "near the start")
@@ -204,8 +205,32 @@ def _rows(layout: Layout, jacobian: Jacobian, q: np.ndarray) -> tuple[np.ndarray
             return active, redundant, singular_values
         other = independent_rows(jacobian(near)[2])
         if len(other[0]) > len(active):
-            active, redundant = other[:2]
+            raise _singular_start(layout, G, len(other[0]), len(active))
     return active, redundant, singular_values
+
+
+def _singular_start(layout: Layout, G: np.ndarray, rank: int, here: int) -> AssemblyError:
+    """Rows lose rank at the start, from `rank` to `here`: several ways lead on, and nothing tells which is right."""
+    joints = quoted(joints_of(layout, degenerate_rows(G, rank)[1]))
+    return AssemblyError(
+        f"system '{layout.system.name}' starts in a singular position: there {joints} leave "
+        f"{counted(rank - here, 'freedom')} more than nearby, and which way the mechanism goes on is not determined. "
+        "Declare start poses a little off it, on the branch that is meant."
+    )
+
+
+def joints_of(layout: Layout, part: np.ndarray) -> list[str]:
+    """Names of the joints whose rows have a large part in something, part of shape (n_phi,); the largest first."""
+    joints = [c for c in layout.constraints if not isinstance(c.element, EulerNorm)]
+    parts = [(part[c.row : c.row + c.rows].max(initial=0.0), c.element.name) for c in joints]
+    ranked = sorted(parts, key=lambda x: -x[0])
+    return [name for size, name in ranked if size > ranked[0][0] / 3.0]
+
+
+def quoted(names: list[str]) -> str:
+    """The first few of the names."""
+    more = f" and {len(names) - 6} more joints" if len(names) > 6 else ""
+    return ", ".join(f"'{name}'" for name in names[:6]) + more
 
 
 def _velocities(layout: Layout, jacobian: Jacobian, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -216,13 +241,13 @@ def _velocities(layout: Layout, jacobian: Jacobian, q: np.ndarray, v: np.ndarray
     """
     _, phi_v, G, _ = jacobian(q, v)
     _, phi_t, _, _ = jacobian(q, np.zeros_like(v))
-    correction = np.linalg.lstsq(G, phi_v, rcond=1e-10)[0] if layout.n_phi else np.zeros_like(v)
+    correction = least_norm(G, phi_v)
     size = np.abs(v).max(initial=0.0)
     driven = _linked(G, phi_t != 0.0)
     gap = np.where(driven, 0.0, np.abs(phi_v))
     if size > 0.0 and gap.max(initial=0.0) > VELOCITY_TOLERANCE * size:
         row = int(np.argmax(gap))
-        worst = int(np.argmax(np.abs(correction) * np.any(G[~driven] != 0.0, axis=0)))
+        worst = int(np.argmax(np.abs(correction) * (abs(G[~driven]).sum(axis=0) > 0.0)))
         raise AssemblyError(
             f"the declared velocities are inconsistent: constraint '{layout.row_names[row]}' would open at "
             f"{phi_v[row]:.4g} (m/s or 1/s). The nearest consistent velocity changes '{layout.names[worst]}' "
@@ -233,9 +258,9 @@ def _velocities(layout: Layout, jacobian: Jacobian, q: np.ndarray, v: np.ndarray
 
 def _linked(G: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """True for all rows of the mechanisms, coordinates that constraints link, to which these belong; shape (m,)."""
-    touches = G != 0.0
+    touches = (G != 0.0).astype(np.int64)
     while True:
-        more = np.any(touches[:, np.any(touches[rows], axis=0)], axis=1) | rows
+        more = (touches @ (touches.T @ rows) > 0) | rows
         if np.array_equal(more, rows):
             return rows
         rows = more

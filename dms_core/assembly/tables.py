@@ -114,6 +114,10 @@ class Tables(NamedTuple):
     scale_v: np.ndarray
     driven: int
     """Constraints that read an input: a jump of it opens rows of accelerations."""
+    redundant: int
+    """Rows that are left out as the others imply them; which ones these may be changes with the position."""
+    c0_ordered: np.ndarray
+    """c0 for which the order of elimination of the Newton matrix was chosen [1/s], (1,)."""
 
 
 CALLS, SIGNALS, WORK, MODEL = fields(Calls), fields(Signals), fields(Work), fields(Tables)

@@ -137,7 +137,7 @@ def _place_of(X, line, other):
 
 
 @compiled(makes_arrays=True)
-def _search_line(R, C, values, largest, threshold, line, is_column, best, state):
+def _search_line(R, C, values, largest, threshold, floor, line, is_column, best, state):
     """Improves best = (cost, key, i, j) by the admissible entries of one line; also whether it had one that counts."""
     cost, key, bi, bj = best
     found = False
@@ -145,7 +145,7 @@ def _search_line(R, C, values, largest, threshold, line, is_column, best, state)
     for p in range(X.first[line], X.first[line] + X.length[line]):
         i, j = (X.store[p], line) if is_column else (line, X.store[p])
         c = (R.length[i] - 1) * (C.length[j] - 1)
-        if c > cost or largest[i] <= SINGULAR:
+        if c > cost or largest[i] <= floor:
             continue
         x = abs(values[_place_of(R, i, j) if is_column else p])
         if x >= threshold * largest[i]:
@@ -157,7 +157,7 @@ def _search_line(R, C, values, largest, threshold, line, is_column, best, state)
 
 
 @compiled(makes_arrays=True)
-def _find_pivot(n, R, C, values, largest, threshold, state):
+def _find_pivot(n, R, C, values, largest, threshold, floor, state):
     """The cheapest admissible entry of the shortest open lines: cost, row (-1 when there is none), column, state.
 
     A line of r entries costs at least (r - 1)^2 when all shorter lines, and r (r - 1) when also the columns of r
@@ -169,7 +169,7 @@ def _find_pivot(n, R, C, values, largest, threshold, state):
             X = R if side else C
             line = X.head[count]
             while line >= 0 and seen < SEARCHED:
-                best, found, state = _search_line(R, C, values, largest, threshold, line, side == 0, best, state)
+                best, found, state = _search_line(R, C, values, largest, threshold, floor, line, side == 0, best, state)
                 seen += found
                 line = X.after[line]
             if best[2] >= 0 and (seen >= SEARCHED or best[0] <= count * (count - 1 + side)):
@@ -263,8 +263,11 @@ def _slide(n, R, C, sweep, window, lowest, opened):
 
 
 @compiled(makes_arrays=True)
-def order(n, start, index, data, sweep, limits, threshold, seed, room):
-    """Both permutations and the number of pivots found, or OUT_OF_ROOM; limits = (window, free_cost)."""
+def order(n, start, index, data, sweep, limits, threshold, seed, room, floor):
+    """Both permutations and the number of pivots found, or OUT_OF_ROOM; limits = (window, free_cost).
+
+    A row whose largest remaining entry is not above `floor` gives no pivot.
+    """
     R, C = _lines(n, start, index, room, False), _lines(n, start, index, room, True)
     values, largest, place = np.empty(room), np.zeros(n), np.full(n, -1)
     values[: data.size] = data
@@ -277,7 +280,7 @@ def order(n, start, index, data, sweep, limits, threshold, seed, room):
     for step in range(n):
         if not free:
             lowest, opened = _slide(n, R, C, sweep, window, lowest, opened)
-        cost, i, j, state = _find_pivot(n, R, C, values, largest, threshold, state)
+        cost, i, j, state = _find_pivot(n, R, C, values, largest, threshold, floor, state)
         if free and cost > limits[1]:
             free, i, opened = False, -1, 0
             _close_all(R)
@@ -285,7 +288,7 @@ def order(n, start, index, data, sweep, limits, threshold, seed, room):
         while i < 0 and opened < n:
             # Nothing admissible among the open lines: the window grows until there is.
             lowest, opened = _slide(n, R, C, sweep, max(window, opened - lowest + 8), lowest, opened)
-            cost, i, j, state = _find_pivot(n, R, C, values, largest, threshold, state)
+            cost, i, j, state = _find_pivot(n, R, C, values, largest, threshold, floor, state)
         if i < 0:
             return row_perm, col_perm, step
         row_perm[step], col_perm[step] = i, j

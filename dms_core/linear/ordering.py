@@ -21,7 +21,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from dms_core.errors import DmsError, InputError
-from dms_core.linear.markowitz import OUT_OF_ROOM, equilibrated, order
+from dms_core.linear.markowitz import OUT_OF_ROOM, SINGULAR, equilibrated, order
 
 
 class SingularMatrixError(DmsError, ArithmeticError):
@@ -75,10 +75,10 @@ def markowitz(
     sweep = _sweep(n, start, index) if window else np.arange(n)
     room = 8 * index.size + 4 * n
     limits = (window or n, free_cost if window else n * n)
-    row_perm, col_perm, done = order(n, start, index, scaled, sweep, limits, threshold, seed, room)
+    row_perm, col_perm, done = order(n, start, index, scaled, sweep, limits, threshold, seed, room, SINGULAR)
     while done == OUT_OF_ROOM:
         room *= 2
-        row_perm, col_perm, done = order(n, start, index, scaled, sweep, limits, threshold, seed, room)
+        row_perm, col_perm, done = order(n, start, index, scaled, sweep, limits, threshold, seed, room, SINGULAR)
     if done < n:
         every = np.arange(n)
         raise SingularMatrixError(np.setdiff1d(every, row_perm[:done]), np.setdiff1d(every, col_perm[:done]))

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dms_core.assembly.finite import FAR, far_numbers, open_call, sentence
+from dms_core.assembly.linear_systems import TYPICAL_C0
 from dms_core.assembly.model import Model
-from dms_core.assembly.tables import MODEL, Tables, with_settings
+from dms_core.assembly.tables import with_settings
 from dms_core.compiled.arena import Packed, inner
 from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.flags import Flag, Limits
@@ -17,9 +17,11 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
+from dms_core.simulation.failure import explain, singular_joints
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
-from dms_core.simulation.parts import advance, restart
+from dms_core.simulation.order_watch import LEFT_BEHIND, WEAK, ordered_for_another_size
+from dms_core.simulation.parts import SINGULAR_PIVOT, advance, restart
 from dms_core.simulation.rates_between import rates_between
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
@@ -31,6 +33,11 @@ BUFFER_ROWS = 256
 WHOLE = 1e-6
 """Share of a step by which rounding may shorten the last one of many."""
 
+LOOK_AGAIN = 0.3
+"""Share of a pivot to which it may fall beside a singular position before that is looked at again."""
+MOST_RESCUES = 8
+"""Times in one call that an iteration which fails at every step size is given another order of elimination."""
+
 RESULT_OF = {
     OUTCOME.done: Result.SUCCESS,
     OUTCOME.step_too_small: Result.STEP_TOO_SMALL,
@@ -39,6 +46,9 @@ RESULT_OF = {
     OUTCOME.too_many_steps: Result.TOO_MANY_STEPS,
     OUTCOME.rates_failed: Result.RATES_FAILED,
 }
+
+HELPED = (OUTCOME.matrix_singular, OUTCOME.rates_failed, OUTCOME.newton_failed, OUTCOME.step_too_small)
+"""Ways to stop that another order of elimination may help."""
 
 
 class World(Inspection):
@@ -62,7 +72,7 @@ class World(Inspection):
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
-        self._singular = ""
+        self._singular = self._why = ""
 
     @property
     def tables(self) -> Packed:
@@ -113,16 +123,14 @@ class World(Inspection):
         if not (t_end == 0.0 or is_positive(t_end)) or t_end < self.time:
             raise InputError(f"t_end: Expected a time of at least the present {self.time:.6g} s, got {t_end} s.")
         try:
-            code, stuck = self._advance(float(t_end), progress), -math.inf
-            while code == OUTCOME.matrix_singular:
-                if not (self.reorder() if self.time > stuck else self._shorten()):
-                    break
-                stuck = self.time
+            tried: set[tuple[int, float, int]] = set()
+            code = self._advance(float(t_end), progress)
+            while code in HELPED and self._help(code, tried):
                 code = self._advance(float(t_end), progress)
         except KeyboardInterrupt:
             self.result = Result.INTERRUPTED
             return self.result
-        self.result = RESULT_OF[code]
+        self.result, self._why = explain(self.model, self._tables, self._world, RESULT_OF[code], self._singular)
         return self.result
 
     def _advance(self, t_end: float, progress: Callable[[float], None] | None) -> int:
@@ -138,14 +146,59 @@ class World(Inspection):
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""
 
-    def reorder(self) -> bool:
-        """Choose rows and pivots anew where the old ones became singular; False if nothing helps."""
-        s = self.state
+    def _help(self, code: int, tried: set[tuple[int, float, int]]) -> bool:
+        """Do something about a matrix that is singular, or soon will be; False if nothing is left that was not tried.
+
+        Args:
+            code: of HELPED.
+            tried: where an order was chosen anew; written.
+        """
+        clock, asked = self.state.clock, code == OUTCOME.matrix_singular
+        c0 = float(clock[CLOCK.c0_factored]) or TYPICAL_C0
+        place = (code, self.time, round(math.log10(c0)))
+        usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
+        watched = usable and not ordered_for_another_size(self._tables.table, self._world.table)
+        if place in tried and watched:
+            clock[CLOCK.best_pivot] = 0.0
+            return True
+        if place in tried or (not asked and sum(p[0] == code for p in tried) >= MOST_RESCUES):
+            usual = (code, self.time, -1)
+            if not asked or usual in tried:
+                return asked and self._shorten()
+            tried.add(usual)
+            return self.reorder() or self._shorten()
+        tried.add(place)
+        weak = clock[CLOCK.pivot] < WEAK * clock[CLOCK.best_pivot]
+        clock[CLOCK.best_pivot] = 0.0
+        if watched and singular_joints(self.model, self.state.q, self.time)[0]:
+            # No choice of rows or pivots is a good one here, and one that is made here is none for later.
+            clock[CLOCK.best_pivot] = LOOK_AGAIN * clock[CLOCK.pivot] / WEAK
+            clock[CLOCK.singular_pivot] = LEFT_BEHIND * clock[CLOCK.pivot]
+            return True
+        if watched and not weak:
+            return True
+        if code == OUTCOME.rates_failed:
+            self.state.counts[COUNTS.restart] = 1
+        return self.reorder(c0 if asked or self.options.fixed_step else TYPICAL_C0) or usable
+
+    def reorder(self, c0: float = TYPICAL_C0) -> bool:
+        """Choose rows and pivots anew where the old ones are, or soon will be, singular; False if nothing helps.
+
+        The motion goes on as it was: the multipliers of the new rows exert the force of the old ones.
+
+        Args:
+            c0: leading coefficient of the step [1/s] that the order is for.
+        """
+        s, before = self.state, self._tables.values.active
         try:
-            self._tables = self.model.reordered(s.q, s.v, self.time, s.signals)
+            self._tables = self.model.reordered(s.q, s.v, self.time, s.signals, c0)
         except ModelError as error:
             self._singular = str(error)
             return False
+        rows = self._tables.values.active
+        if not np.array_equal(rows, before):
+            kept = np.array([s.lam, s.lam_before, s.mu])
+            s.lam[:], s.lam_before[:], s.mu[:] = self.model.carried_over(s.q, kept, rows)
         self._world = with_tables(self._tables.values, s)
         self.state = self._world.values
         return True
@@ -193,36 +246,13 @@ class World(Inspection):
         """How the last call of `advance` ended, in sentences: where it went wrong, or which steps were shorter."""
         message, asked, shortest = self.result.value, self.options.fixed_step, self.stats().smallest_step
         if self.result is not Result.SUCCESS:
-            return f"{message} Stopped at t = {self.time:.6g} s.{self._culprit()}"
+            return f"{message} Stopped at t = {self.time:.6g} s.{self._why}"
         if asked and 0.0 < shortest < asked * (1.0 - WHOLE):
             message += (
                 f" Steps of {asked:.6g} s; the shortest, which ends on a jump of an input or on an end time that is no "
                 f"multiple of that, is {shortest:.6g} s."
             )
         return message
-
-    def _culprit(self) -> str:
-        """Where the last attempt at a step failed, as a sentence with a space before it; empty where nothing did."""
-        if self.result in (Result.SUCCESS, Result.INTERRUPTED):
-            return ""
-        table = self._tables.table
-        dynamics, constraints = inner(table, MODEL.dynamics), inner(table, MODEL.constraints)
-        far = far_numbers(self.model.system) + self._far_inputs()
-        call = open_call(self.model.layout, dynamics, constraints, inner(self._world.table, STATE.w))
-        if call is not None:
-            return f" {sentence(self.model.layout, call)}"
-        if self.result is Result.MATRIX_SINGULAR and self._singular:
-            return f" There {self._singular}{far}"
-        name = widest_coordinate(self.model, self._tables.values, self.state, self.result is Result.RATES_FAILED)
-        kind = self.model.system.element(name.rpartition(".")[0]).kind
-        where = "Steps are held small first by" if self.result is Result.TOO_MANY_STEPS else "It goes wrong first at"
-        return f" {where} '{name}' ({kind}).{far}"
-
-    def _far_inputs(self) -> str:
-        """The inputs that were set so far from 1 that they may be why a run failed; as `far_numbers`."""
-        values = zip(self.model.layout.input_index, self.state.w.u[:, 0], strict=True)
-        far = [f"'{name}' = {x}" for name, x in values if abs(x) > 10.0**FAR]
-        return f" Look at inputs far from 1 in SI units: {', '.join(far)}." if far else ""
 
     def stats(self) -> SolveStats:
         """Counts and worst errors so far."""
@@ -240,17 +270,6 @@ class World(Inspection):
             smallest_step=float(x[LARGEST.h_least]) if c[COUNTS.steps] else 0.0,
             largest_step=float(x[LARGEST.h_most]),
         )
-
-
-def widest_coordinate(model: Model, tables: Tables, state: State, rates: bool) -> str:
-    """Name of the coordinate that the last attempt changed most, over its tolerance, or over its size for rates."""
-    free = tables.free
-    if rates:
-        change = np.abs(state.rate_x[: len(free)]) / tables.scale_v[free]
-    else:
-        change = np.abs(state.w.q[free] - state.q_guess[free]) / state.wq[free]
-    change[~np.isfinite(change)] = np.inf
-    return model.layout.names[free[int(np.argmax(change))]]
 
 
 class Simulation(World):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import fields, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
+from dms_core.simulation.order_watch import LEFT_BEHIND, nearly_singular
 from dms_core.simulation.parts import PARTS, SINGULAR_PIVOT, run_part
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
 
@@ -34,6 +35,9 @@ MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
 SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping, and below which no other is trusted before it is seen."""
+ROUNDING = 100.0
+"""Correction, over the local error allowed, below which one that no longer shrinks beside a singular position is
+rounding: that of phi, 1e-16, comes back divided by the square of the smallest singular value of phi_q."""
 C0_CHANGE = 0.1
 """Relative change of c0 up to which an old matrix is tried; the scaled matrix depends on c0 only weakly."""
 
@@ -102,6 +106,9 @@ def refresh(m, s, c0):
     count[COUNTS.age] = 0
     clock[CLOCK.contraction] = 0.0
     run_part(m, s, PARTS.newton_matrix)
+    clock[CLOCK.best_pivot] = max(clock[CLOCK.best_pivot], clock[CLOCK.pivot])
+    if clock[CLOCK.pivot] > LEFT_BEHIND * clock[CLOCK.singular_pivot]:
+        clock[CLOCK.singular_pivot] = 0.0
     return clock[CLOCK.pivot] > SINGULAR_PIVOT
 
 
@@ -212,6 +219,9 @@ def newton(m, s, o, c0, close):
         norm = correction(m, s, c0)
         if not norm < math.inf:
             return (NEWTON.not_finite if fresh else NEWTON.stale_matrix), k
+        if k > 1 and fresh and 0.5 * before < norm < ROUNDING and nearly_singular(s):
+            if not close or close_constraints(m, s, o, c0):
+                return NEWTON.converged, k + 1
         if k > 0:
             if norm > before and norm > o.newton_tol:
                 if not fresh:

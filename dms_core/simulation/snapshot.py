@@ -41,6 +41,8 @@ class Orders(NamedTuple):
     rate_lu: LuTables
     scale_q: np.ndarray
     scale_v: np.ndarray
+    redundant: int
+    c0_ordered: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,10 @@ class Clock(NamedTuple):
     """Time at which inputs are evaluated."""
     worst: int
     """Largest local error over its tolerance since the last landing [-]."""
+    best_pivot: int
+    """Largest of the relative pivots of the Newton matrix since its order of elimination was chosen [-]."""
+    singular_pivot: int
+    """Relative pivot below which the position is known to be nearly singular; 0 where it is regular [-]."""
 
 
 class Counts(NamedTuple):
@@ -212,10 +216,12 @@ def renumber(s):
 
 
 def with_tables(tables: Tables, state: State) -> Packed:
-    """The same world for other rows and elimination orders: it starts afresh, with multipliers 0 as their guess."""
-    state.counts[COUNTS.restart] = state.counts[COUNTS.stale] = 1
-    state.counts[COUNTS.rates_factored] = 0
-    state.lam[:], state.mu[:] = 0.0, 0.0
-    state.w.lam[:], state.w.mu[:] = 0.0, 0.0
-    radau = new_radau_state(tables, len(state.lam), state.radau is not NOT_USED)
+    """The same world, in the same motion, for other rows and elimination orders; multipliers are the caller's."""
+    state.counts[COUNTS.stale], state.counts[COUNTS.rates_factored] = 1, 0
+    state.clock[CLOCK.best_pivot] = state.clock[CLOCK.singular_pivot] = 0.0
+    used = state.radau is not NOT_USED
+    if used:
+        # Its last step's polynomial belongs to the rows that were; the next step begins without one.
+        state.counts[COUNTS.restart] = 1
+    radau = new_radau_state(tables, len(state.lam), used)
     return Packed(State(**{**state._asdict(), **_linear_arrays(tables), "radau": radau}))

@@ -17,6 +17,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.simulation.bdf2 import bdf2_step
 from dms_core.simulation.implicit_stage import set_weights
 from dms_core.simulation.newton import MAX_ITERATIONS, NEWTON, note_errors
+from dms_core.simulation.order_watch import may_be_singular, nearly_singular, ordered_for_another_size, pivots_weaken
 from dms_core.simulation.parts import PARTS, run_radau5, run_rates, set_inputs
 from dms_core.simulation.radau_constants import ORDER_OF_ERROR, REAL
 from dms_core.simulation.radau_state import CONTROL, RADAU
@@ -32,6 +33,7 @@ class Outcome(NamedTuple):
     step_too_small: int
     newton_failed: int
     matrix_singular: int
+    """The Newton matrix is singular, or will be soon, in the present order of elimination: another one may do."""
     too_many_steps: int
     rates_failed: int
 
@@ -45,6 +47,14 @@ GRID, GRID_SAFETY = math.log(1.4), 0.99
 """Logarithm of the ratio of neighbouring sizes on the grid; on average a step is a sixth below what is allowed."""
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
+HELP = 3
+"""Failed attempts at a step after which order and position are looked at."""
+LEAPS = (1.5, 2.3, 3.1, 4.2)
+"""Longer steps, over the one that failed, that are tried across a singular position."""
+SINGULAR_ERROR = 100.0
+"""Local error, over what a step may make, that counts as rounding beside a singular position."""
+KEEPING = 0.5
+"""Local error at which a step keeps its size: rounding beside a singular position says nothing about the next size."""
 NEAR = 32
 """Steps to a landing from which on those of SDIRK2 are of one size; farther off the size follows the error."""
 
@@ -205,14 +215,20 @@ def one_step(m, s, o, stop, kept):
         wanted = min(wanted, GROW * clock[CLOCK.h_before])
     rest = stop - clock[CLOCK.t]
     equal = o.method == METHOD.sdirk2 and not fixed and rest <= NEAR * wanted
-    first_try = True
+    first_try, failures, leaps, before_leap = True, 0, 0, 0.0
     while True:
         h = landing_size(wanted, rest, fixed, equal)
         code, iterations, error, c0 = try_step(m, s, o, h, started)
         if code == NEWTON.singular:
             return OUTCOME.matrix_singular
-        if code == NEWTON.converged and (error <= 1.0 or fixed):
+        if code == NEWTON.converged and (error <= (SINGULAR_ERROR if nearly_singular(s) else 1.0) or fixed):
             break
+        failures += 1
+        if (code != NEWTON.converged and (fixed or failures > 1) and ordered_for_another_size(m, s)) or (
+            failures == HELP and not fixed and may_be_singular(m, s)
+        ):
+            clock[CLOCK.h_wanted] = h
+            return OUTCOME.matrix_singular
         if code == NEWTON.converged:
             count[COUNTS.rejected_error] += 1
             wanted = h * max(SHRINK, min(0.9, SAFETY * error**power))
@@ -225,9 +241,16 @@ def one_step(m, s, o, stop, kept):
                 set_inputs(m, s, clock[CLOCK.t], False)
                 if not run_rates(m, s, PARTS.consistent_rates, 0.0):
                     return OUTCOME.rates_failed
+        if not fixed and nearly_singular(s):
+            # A shorter step would end no farther from the singular position: one that passes it may do.
+            before_leap = before_leap if leaps > 0 else h
+            wanted = before_leap * (LEAPS[leaps] if leaps < len(LEAPS) else 0.6)
+            leaps = leaps + 1 if leaps < len(LEAPS) else 0
         first_try = False
         if fixed or wanted < o.h_min:
             return OUTCOME.step_too_small if code == NEWTON.converged else OUTCOME.newton_failed
+    if nearly_singular(s):
+        error = min(error, KEEPING)
     note_errors(s)
     accept(s, h, c0, started)
     if h == rest:
@@ -281,6 +304,8 @@ def advance_method(m, s, o, t_end, record, recorded):
             return OUTCOME.buffer_full, recorded
         if count[COUNTS.steps] >= o.max_steps:
             return OUTCOME.too_many_steps, recorded
+        if pivots_weaken(m, s):
+            return OUTCOME.matrix_singular, recorded
         if count[COUNTS.restart] == 1:
             if not restart_method(m, s, o):
                 return OUTCOME.rates_failed, recorded

@@ -1,0 +1,1 @@
+"""Random closed mechanisms that can move: what the solver is stressed with."""
