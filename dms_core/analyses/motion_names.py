@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dms_core.assembly.model import Model
+from dms_core.errors import counted
 from dms_core.model.element import GROUND
 
 MOST = 2
@@ -36,7 +37,8 @@ def motion_in_words(model: Model, q: np.ndarray, dq: np.ndarray) -> str:
             parts.append((abs(dq[own + k]) / size, f"'{element.name}.{coordinate.name}' changes"))
     parts = sorted((p for p in parts if p[0] > STILL), key=lambda p: -p[0])
     said = ", ".join(words for _, words in parts[:MOST])
-    more = f" and {len(parts) - MOST} others move with it" if len(parts) > MOST else ""
+    others = len(parts) - MOST
+    more = f" and {counted(others, 'other')} {'moves' if others == 1 else 'move'} with it" if others > 0 else ""
     joints = _moving_joints(model, q, dq / size, turns)
     return said + more + (f" (at {', '.join(joints[:MOST + 1])})" if joints else "")
 

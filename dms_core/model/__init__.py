@@ -35,7 +35,7 @@ from dms_core.model.ropes import PathPoint, RopeForce
 from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSensor, Point, RopeSensor, Tracking
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
-from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, MinimumJerk, Spline, Steps
+from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, MinimumJerk, Samples, Spline, Steps, Table
 from dms_core.model.system import System
 
 __all__ = [
@@ -77,6 +77,7 @@ __all__ = [
     "RopeForce",
     "RopeLength",
     "RopeSensor",
+    "Samples",
     "SecondOrder",
     "Slider",
     "Spherical",
@@ -84,6 +85,7 @@ __all__ = [
     "SpringDamper",
     "Steps",
     "System",
+    "Table",
     "ThelenCurves",
     "ThelenMuscle",
     "Tracking",
