@@ -75,7 +75,8 @@ def inverse_dynamics(
 
     Raises:
         InputError: a name of the motion is that of no joint or joint angle.
-        ModelError, SimulationError: see `kinematic`.
+        ModelError: see `kinematic`.
+        SimulationError: the mechanism cannot follow the motion.
 
     Example:
         >>> recorded = motion_of(trajectory, ["elbow_angle", "grip"], 0.005)
@@ -94,7 +95,7 @@ def inverse_dynamics(
         # Inputs of what was left out are read by nobody, and a recorded start may be far from the declared one.
         warnings.simplefilter("ignore", ModelWarning)
         model = Model(driven)
-    result = kinematic(model, times, progress)
+    result = kinematic(model, times, progress).check()
     loads = {name.removeprefix(DRIVER): load for name, load in driver_loads(model, result.states).items()}
     return InverseResult(model, result, loads, names)
 
@@ -124,9 +125,10 @@ def _driver(system: System, name: str) -> Constraint:
     if isinstance(element, Revolute):
         return AngleDriver(name=own, joint=name, input=course)
     if isinstance(element, Slider):
+        point_j = element.point_j or tuple(system.start_point(element.body_i, element.point_i, element.body_j))
         return PositionDriver(
             name=own, body_i=element.body_i, body_j=element.body_j, axis_i=element.axis_i, point_i=element.point_i,
-            point_j=element.point_j, input=course,
+            point_j=point_j, input=course,
         )  # fmt: skip
     there = [e.name for e in (*system.constraints, *system.sensors) if isinstance(e, JointAngle | Revolute | Slider)]
     raise InputError(

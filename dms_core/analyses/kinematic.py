@@ -1,11 +1,10 @@
-"""Kinematic simulation: drivers move every freedom, so that positions, velocities and accelerations follow from
-phi alone (paper Fig. 1), and multipliers from the equations of motion.
+"""Kinematic simulation: drivers move every freedom, and the motion follows from phi alone (paper Fig. 1).
 
     phi(q, t) = 0,    phi_q v = -phi_t,    phi_q vdot = -(phi_q v)_q v - phi_tt,    phi_q^T lam = f - M vdot
 
-At each time Newton's method closes the constraints from the position predicted by v and vdot; where the prediction errs
-too much the interval is halved. Where phi_q loses rank the position is singular: the motion goes on along its branch and
-the place is reported, or ends there, where velocities grow without bound (a rocker at the end of its swing).
+At each time Newton's method closes the constraints from the position predicted by v and vdot; where the prediction
+errs too much the interval is halved. Where phi_q loses rank the position is singular: the motion goes on along its
+branch and the place is reported, or ends there, where velocities grow without bound (a rocker at the end of its swing).
 
 States of elements (fibres, activations, controllers) do not follow from positions; they stay at their start.
 """
@@ -64,6 +63,18 @@ class KinematicResult:
     iterations: int
     substeps: int
     """Positions between those that were asked for."""
+    failure: str = ""
+    """Why the motion ends before the last time; empty where it does not."""
+
+    def check(self) -> KinematicResult:
+        """This result.
+
+        Raises:
+            SimulationError: the mechanism could not follow its drivers to the end.
+        """
+        if self.failure:
+            raise SimulationError(self.failure)
+        return self
 
     @property
     def t(self) -> np.ndarray:
@@ -152,13 +163,15 @@ def kinematic(
         times: rising, from 0 on [s], shape (n,).
         progress: called with the time reached.
 
+    Returns:
+        The motion, up to a singular position that it cannot leave if there is one (`failure` names it).
+
     Raises:
         InputError: times do not rise, or begin before 0.
         ModelError: a driver is missing, or two drive the same coordinate; names the motion or the drivers.
-        SimulationError: the mechanism cannot follow, in a singular position; names it.
 
     Example:
-        >>> result = kinematic(model, np.linspace(0.0, 2.0, 201))
+        >>> result = kinematic(model, np.linspace(0.0, 2.0, 201)).check()
         >>> result.sensors()["rocker_angle.acceleration"], result.singular
     """
     compiled = model if isinstance(model, Model) else Model(model)
@@ -166,18 +179,24 @@ def kinematic(
     if not len(times) or not np.isfinite(times).all() or times[0] < 0.0 or np.any(np.diff(times) <= 0.0):
         raise InputError("times: Expected finite, rising times from 0 s on.")
     driven = Driven(compiled)
-    walk = _Walk(driven)
+    walk, failure = _Walk(driven), ""
     rows = []
     for t in times:
-        walk.to(float(t))
+        try:
+            walk.to(float(t))
+        except SimulationError as error:
+            failure = str(error)
+            break
         lam = driven.multipliers(walk.q, walk.v, walk.a, walk.t)
         rows.append((walk.q, walk.v, walk.a, lam))
         if progress is not None:
             progress(float(t))
+    if not rows:
+        raise SimulationError(failure)
     q, v, a, lam = (np.array(part) for part in zip(*rows, strict=True))
-    behind = times == 0.0
-    states = States(compiled, compiled.new_signals(), times, q, v, a, lam, np.zeros_like(lam), behind)
-    return KinematicResult(states, tuple(walk.singular), walk.iterations, walk.substeps)
+    done = times[: len(rows)]
+    states = States(compiled, compiled.new_signals(), done, q, v, a, lam, np.zeros_like(lam), done == 0.0)
+    return KinematicResult(states, tuple(walk.singular), walk.iterations, walk.substeps, failure)
 
 
 class _Walk:
@@ -316,8 +335,8 @@ def _check_drivers(model: Model, moving: np.ndarray) -> None:
         missing = len(moving) - rank
         have = f" Drivers: {choices(names)}." if names else " There is none."
         raise ModelError(
-            f"system '{model.system.name}': {missing} {'driver is' if missing == 1 else 'drivers are'} missing: nothing "
-            f"determines that {'; or that '.join(words)}. A kinematic simulation needs an angle_driver or a "
+            f"system '{model.system.name}': {missing} {'driver is' if missing == 1 else 'drivers are'} missing: "
+            f"nothing determines that {'; or that '.join(words)}. A kinematic simulation needs an angle_driver or a "
             f"position_driver for each freedom.{have}"
         )
 
@@ -332,5 +351,3 @@ def driver_loads(model: Model, states: States) -> dict[str, np.ndarray]:
             name = call.element.name if call.rows == 1 else model.layout.row_names[call.row + k]
             found[name] = -states.lam[:, call.row + k]
     return found
-
-

@@ -2,7 +2,7 @@
 
     min  sum a_i^2 / 2 + |r|^2 / (2 e)     such that  F a + r = b,   low <= a <= high
 
-Stationary where a = clip(F^T nu) and r = e nu (Karush, Kuhn and Tucker), so that nu solves the piecewise linear equations
+Stationary where a = clip(F^T nu) and r = e nu (Karush, Kuhn and Tucker), so that nu solves piecewise linear equations
 
     F clip(F^T nu) + e nu = b
 
@@ -41,7 +41,8 @@ def least_activations(F: np.ndarray, b: np.ndarray, low: float, high: float) -> 
     Args:
         F: moment of each muscle at full activation about each joint, shape (d, m).
         b: wanted moments, shape (d,).
-        low, high: bounds of all activations.
+        low: smallest activation.
+        high: largest activation.
     """
     largest = float(np.max(np.sum(F * F, axis=1), initial=0.0)) or 1.0
     e, nu = REMAINDER * largest, np.zeros(len(b))

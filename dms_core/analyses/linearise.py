@@ -1,12 +1,13 @@
 """Linearisation about any state: dx/dt = A x + B u, y = C x + D u in independent coordinates, with names.
 
 Independent coordinates are some of the model's own, z = q[chosen], in which the others can be told (independent.py);
-with w = v[chosen] and the states s of first order, x = (z, w, s) is a chart of all states that the constraints allow, and
+with w = v[chosen] and the states s of first order, x = (z, w, s) is a chart of all states that the constraints allow.
+Then
 
     zdot = w,     wdot = vdot[chosen],     sdot = v of first-order coordinates
 
-are functions of x and u. A, B, C, D are their derivatives, exact but for one part: (phi_q v)_q v is differentiated by
-central differences where the state moves and a constraint is curved in its third derivative.
+are functions of x and u, and A, B, C, D are their derivatives. One part of them is a central difference: that of
+(phi_q v)_q v by q, where the state moves.
 
     dq = N dz + L (-phi_u du),   dv = N dw + L (-(phi_q v)_q dq - (phi_t)_u du)
     M dvdot + phi_q^T dlam + r_v dv + r_q dq + r_u du = 0
@@ -185,13 +186,15 @@ def linearise(model: Model, point: OperatingPoint, *, held: Sequence[int] | np.n
     dx[2 * n_z :] = rates.v[at.first]
     s = model.derivatives.sensor_blocks(point)
     dy = s.q @ dq + s.v @ rates.v + s.a @ rates.a + s.lam @ rates.lam + _by_inputs(s.u, n_x)
-    A, B = dx[:, :n_x], [dx[:, n_x + k * n_u : n_x + (k + 1) * n_u] for k in range(3)]
-    C, D = dy[:, :n_x], [dy[:, n_x + k * n_u : n_x + (k + 1) * n_u] for k in range(3)]
+    cuts = [n_x, n_x + n_u, n_x + 2 * n_u]
+    A, B, B_rate, B_acceleration = np.split(dx, cuts, axis=1)
+    C, D, D_rate, D_acceleration = np.split(dy, cuts, axis=1)
     names = model.layout.names
     states = (*(f"q.{names[k]}" for k in at.chosen), *(f"v.{names[k]}" for k in at.chosen),
               *(f"q.{names[k]}" for k in at.first))  # fmt: skip
     return Linearisation(
-        model, point, A, *B, C, *D, s.y, states, tuple(model.layout.input_index), tuple(model.layout.outputs),
+        model, point, A, B, B_rate, B_acceleration, C, D, D_rate, D_acceleration, s.y,
+        states, tuple(model.layout.input_index), tuple(model.layout.outputs),
         dq[:, :n_x].copy(),
     )  # fmt: skip
 
@@ -223,9 +226,7 @@ def _displacements(model: Model, b: Blocks, at: Independent, n_x: int, n_u: int)
     return dq, dv
 
 
-def _rates(
-    model: Model, point: OperatingPoint, b: Blocks, at: Independent, dq: np.ndarray, dv: np.ndarray
-) -> _Rates:
+def _rates(model: Model, point: OperatingPoint, b: Blocks, at: Independent, dq: np.ndarray, dv: np.ndarray) -> _Rates:
     """Accelerations, first-order rates and multipliers of each column."""
     n_s, rows, n_x = len(at.second), at.rows, dq.shape[1] - 3 * len(model.layout.input_index)
     G, M, C = b.phi_q.toarray()[rows], b.r2_a.toarray(), b.r2_v.toarray()

@@ -40,7 +40,7 @@ def motion_in_words(model: Model, q: np.ndarray, dq: np.ndarray) -> str:
     others = len(parts) - MOST
     more = f" and {counted(others, 'other')} {'moves' if others == 1 else 'move'} with it" if others > 0 else ""
     joints = _moving_joints(model, q, dq / size, turns)
-    return said + more + (f" (at {', '.join(joints[:MOST + 1])})" if joints else "")
+    return said + more + (f" (at {', '.join(joints[: MOST + 1])})" if joints else "")
 
 
 def _turns(model: Model, q: np.ndarray, dq: np.ndarray) -> dict[str, np.ndarray]:
@@ -87,7 +87,7 @@ def _moving_joints(model: Model, q: np.ndarray, dq: np.ndarray, turns: dict[str,
 
 def _gap_rate(model: Model, q: np.ndarray, dq: np.ndarray, turns: dict[str, np.ndarray], call) -> float:  # noqa: ANN001
     """Rate at which the constraint's own points part [m]; 0 where it has none."""
-    points = type(call.element).own_points
+    points = call.element.own_points
     if len(points) != 2:
         return 0.0
     rates = []

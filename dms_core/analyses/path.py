@@ -279,11 +279,8 @@ def _events(follower: _Follower, here: _Place, there: _Place, length: float) -> 
     return found
 
 
-def _located(
-    follower: _Follower, here: _Place, length: float, number: Callable[[_Place], float]
-) -> _Place | None:
+def _located(follower: _Follower, here: _Place, length: float, number: Callable[[_Place], float]) -> _Place | None:
     """The place between 0 and length where a number changes its sign; None where it cannot be told."""
-
     known = {0.0: here}
 
     def at(share: float) -> float:

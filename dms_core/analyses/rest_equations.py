@@ -6,9 +6,10 @@ s is the load factor. A named input is s times its value; a named force element 
 full. Velocities, accelerations and the rates of all inputs are 0; element states (fibres, activations, ropes' tensions)
 are among q, and their rows say that they rest.
 
-A controller that integrates its error e has the row vdot_c = edot, which does not hold its integral at rest. There e = 0 is solved
-instead, e being the rate that the element's own `start_states` gives; its derivative is a central difference. Where the
-integral moves nothing (a controller without integral gain or without authority), it is held, and its rate is e.
+A controller that integrates its error e has the row vdot_c = edot, which does not hold its integral at rest. There
+e = 0 is solved instead, e being the rate that the element's own `start_states` gives; its derivative is a central
+difference. Where the integral moves nothing (a controller without integral gain or without authority), it is held, and
+its rate is e.
 """
 
 from __future__ import annotations

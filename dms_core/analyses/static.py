@@ -6,10 +6,10 @@ from rest,
     (M / h^2 + C / h + K) dq + phi_q^T lam = f,     phi_q dq = -phi            (C / h alone for states of first order)
 
 whose pseudo-time h grows as the equilibrium comes near; for h to infinity it is Newton's step, and converges
-quadratically (pseudo-transient continuation, Kelley and Keyes 1998). All speed is taken out after each step, so that the
-system creeps to where it would come to rest, and does not end on an unstable equilibrium that happens to be near. A line
-search shortens a step over which the force turns round: |work behind it| <= 0.9 |work before it|, or that moves a part
-too far. Loads may be put on in steps.
+quadratically (pseudo-transient continuation, Kelley and Keyes 1998). All speed is taken out after each step, so that
+the system creeps to where it would come to rest, and does not end on an unstable equilibrium that happens to be near. A
+line search shortens a step over which the force turns round, |work behind it| <= 0.9 |work before it|, or that moves a
+part too far. Loads may be put on in steps.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FIRST_TIME, LARGEST_TIME, SMALLEST_TIME = 0.05, 1e9, 1e-7
 LONGEST = 0.3
 """Longest change of a coordinate in one step, over its nominal size."""
 NEAR, CONVERGED = 1e-6, 1e-10
-"""Step over the nominal sizes from which on steps are Newton's own, and that of the last: the next would be rounding."""
+"""Step over the nominal sizes from which on steps are Newton's own, and that of the last one: the next is rounding."""
 MAX_ITERATIONS = 300
 CLOSED, MAX_CLOSING = 1e-12, 12
 """Constraint error after a step [m or -], and iterations to get there."""
@@ -115,7 +115,9 @@ def states_at_rest(found: Sequence[Equilibrium]) -> States:
 class RestStates(States):
     """States of rest, each with its own inputs."""
 
-    def __init__(self, model: Model, inputs: Sequence[np.ndarray], q: np.ndarray, v: np.ndarray, lam: np.ndarray) -> None:
+    def __init__(
+        self, model: Model, inputs: Sequence[np.ndarray], q: np.ndarray, v: np.ndarray, lam: np.ndarray
+    ) -> None:
         zero = np.zeros_like(q)
         super().__init__(model, model.new_signals(), np.zeros(len(q)), q, v, zero, lam, np.zeros_like(lam))
         self._inputs = inputs
@@ -193,6 +195,7 @@ def relaxed(equations: RestEquations, q: np.ndarray, s: float) -> tuple[np.ndarr
     h, change = FIRST_TIME, np.zeros(model.n_q)
     q = closed(equations, q, s)
     lam, b = _balanced(equations, q, np.zeros(model.n_phi), s)
+    at_start = float(np.abs(b.f).max(initial=0.0))
     for iteration in range(1, MAX_ITERATIONS + 1):
         N = basis(model, b.G)
         change = _step(model, b, N, h)
@@ -207,7 +210,7 @@ def relaxed(equations: RestEquations, q: np.ndarray, s: float) -> tuple[np.ndarr
         size = float(np.max(np.abs(trial - q) / scale))
         q, lam, b = trial, lam_trial, b_trial
         if size < CONVERGED and h >= LARGEST_TIME:
-            if not _balanced_forces(model, b, lam):
+            if not _balanced_forces(model, b, lam, at_start):
                 break
             _check_unique(equations, q, b)
             return q, lam, iteration
@@ -215,16 +218,14 @@ def relaxed(equations: RestEquations, q: np.ndarray, s: float) -> tuple[np.ndarr
     raise SimulationError(_nowhere(equations, q, b, change, s))
 
 
-def _balanced_forces(model: Model, b: RestBlocks, lam: np.ndarray) -> bool:
-    """Whether what is left along the free motions is small beside the forces that cancel there."""
+def _balanced_forces(model: Model, b: RestBlocks, lam: np.ndarray, at_start: float) -> bool:
+    """Whether what is left along the free motions is small beside the forces that cancel there, or were at the start."""
     left = np.abs(basis(model, b.G).T @ b.f)
     parts = np.abs(b.f) + np.abs(b.G.T) @ np.abs(lam)
-    return bool(np.all(left <= LEFT * parts.max(initial=0.0)))
+    return bool(np.all(left <= LEFT * max(float(parts.max(initial=0.0)), at_start)))
 
 
-def _balanced(
-    equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float
-) -> tuple[np.ndarray, RestBlocks]:
+def _balanced(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float) -> tuple[np.ndarray, RestBlocks]:
     """Multipliers of least norm that balance what they can, and the equations with them."""
     b = equations.at(q, lam, s)
     lam = balancing(b)
@@ -270,9 +271,7 @@ def _short(model: Model, change: np.ndarray, scale: np.ndarray) -> bool:
     """Whether a step is finite, and moves bodies, and states with a smallest value, not too far."""
     bounded = np.array([np.isfinite(c.least) for c in model.layout.coordinates])
     bounded[: _bodies(model)] = True
-    return bool(
-        np.isfinite(change).all() and np.max(np.abs(change[bounded]) / scale[bounded], initial=0.0) <= LONGEST
-    )
+    return bool(np.isfinite(change).all() and np.max(np.abs(change[bounded]) / scale[bounded], initial=0.0) <= LONGEST)
 
 
 def _creeps(model: Model, b: RestBlocks, after: RestBlocks, N: np.ndarray, change: np.ndarray, h: float) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -40,7 +41,9 @@ class CsvTable(NamedTuple):
             InputError: there is none; lists the names.
         """
         if name not in self.columns:
-            raise InputError(f"table '{self.path}': column '{name}' does not exist. There are: {choices(self.columns)}.")
+            raise InputError(
+                f"table '{self.path}': column '{name}' does not exist. There are: {choices(self.columns)}."
+            )
         return self.columns[name]
 
 
@@ -63,10 +66,12 @@ def read_table(path: str | Path, wanted: tuple[str, ...] = ()) -> CsvTable:
         raise InputError(f"table '{path}' is empty. Expected a line of column names, then lines of numbers.")
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"table '{path}': column '{name}' stands {names.count(name)} times; expected one of a name.")
+            raise InputError(
+                f"table '{path}': column '{name}' stands {names.count(name)} times; expected one of a name."
+            )
     for name in wanted:
         if name not in names:
-            raise InputError(f"table '{path}': column '{name}' does not exist. There are: {choices(names)}.")
+            raise _no_column(path, name, names)
     places = [(name, names.index(name)) for name in (wanted or names)]
     values: list[list[float]] = []
     lines = []
@@ -79,6 +84,11 @@ def read_table(path: str | Path, wanted: tuple[str, ...] = ()) -> CsvTable:
         raise InputError(f"table '{path}' has column names but no rows.")
     table = np.array(values)
     return CsvTable(Path(path), {name: table[:, k].copy() for k, (name, _) in enumerate(places)}, lines)
+
+
+def _no_column(path: str | Path, name: str, names: Iterable[str]) -> InputError:
+    """The error of a column that is not there."""
+    return InputError(f"table '{path}': column '{name}' does not exist. There are: {choices(names)}.")
 
 
 def _number(path: str | Path, line: int, name: str, cells: list[str], k: int) -> float:
@@ -113,13 +123,15 @@ def check_times(table: CsvTable, name: str, times: np.ndarray, longest: float | 
         k = int(np.argmax(steps <= 0.0))
         what = "stands twice" if steps[k] == 0.0 else "falls"
         raise InputError(
-            f"table '{table.path}', line {table.lines[k + 1]}: the time in '{name}' {what}: {times[k + 1]:.9g} s behind "
-            f"{times[k]:.9g} s. Expected times that rise from row to row."
+            f"table '{table.path}', line {table.lines[k + 1]}: the time in '{name}' {what}: {times[k + 1]:.9g} s "
+            f"behind {times[k]:.9g} s. Expected times that rise from row to row."
         )
     allowed = longest if longest is not None else HOLE * float(np.median(steps)) if len(steps) else np.inf
     if np.any(steps > allowed * (1.0 + 1e-9)):
         k = int(np.argmax(steps))
-        usual = f"rows are usually {np.median(steps):.4g} s apart" if longest is None else f"longest_gap is {longest:g} s"
+        usual = (
+            f"rows are usually {np.median(steps):.4g} s apart" if longest is None else f"longest_gap is {longest:g} s"
+        )
         raise InputError(
             f"table '{table.path}', line {table.lines[k + 1]}: nothing is known from {times[k]:.9g} to "
             f"{times[k + 1]:.9g} s, while {usual}. Fill the gap, or allow it with longest_gap: {steps[k]:.4g}."

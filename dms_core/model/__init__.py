@@ -35,7 +35,18 @@ from dms_core.model.ropes import PathPoint, RopeForce
 from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSensor, Point, RopeSensor, Tracking
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
-from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, MinimumJerk, Samples, Spline, Steps, Table
+from dms_core.model.signals import (
+    Constant,
+    Function,
+    Harmonic,
+    Input,
+    Lines,
+    MinimumJerk,
+    Samples,
+    Spline,
+    Steps,
+    Table,
+)
 from dms_core.model.system import System
 
 __all__ = [

@@ -138,7 +138,7 @@ class _Recorded(Signal):
     cutoff: float | None = Field(
         default=None,
         gt=0.0,
-        description="cut-off of a low-pass filter without delay [Hz] (Butterworth of order 2, both ways); default: none",
+        description="cut-off of a low-pass filter [Hz]: Butterworth of order 2, both ways; default: no filter",
     )
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
