@@ -149,7 +149,9 @@ class Linearisation:
         return {**names, **outputs, **{name: getattr(self, name).tolist() for name in matrices}}
 
 
-def linearise(model: Model, point: OperatingPoint, *, held: Sequence[int] | np.ndarray = ()) -> Linearisation:
+def linearise(
+    model: Model, point: OperatingPoint, *, held: Sequence[int] | np.ndarray = (), blocks: Blocks | None = None
+) -> Linearisation:
     """Linear system about a state of the model.
 
     Args:
@@ -157,6 +159,7 @@ def linearise(model: Model, point: OperatingPoint, *, held: Sequence[int] | np.n
         point: a state that satisfies the equations, as `World.operating_point` (behind `settle`) or
             `Equilibrium.point` give it.
         held: coordinates of second order that are no states (an integral that moves nothing).
+        blocks: equations there; default: the model's own, under the whole load.
 
     Raises:
         InputError: the point does not satisfy the equations.
@@ -169,7 +172,7 @@ def linearise(model: Model, point: OperatingPoint, *, held: Sequence[int] | np.n
         >>> linear = linearise(model, world.operating_point())
         >>> linear.states, linear.eigenvalues
     """
-    b = model.derivatives.blocks(point)
+    b = model.derivatives.blocks(point) if blocks is None else blocks
     _check_state(model, point, b)
     G = b.phi_q.toarray()
     at = independent(model, G)

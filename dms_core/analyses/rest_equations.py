@@ -153,22 +153,29 @@ class RestEquations:
 
     def at(self, q: np.ndarray, lam: np.ndarray, s: float) -> RestBlocks:
         """Residual and derivatives at position q with multipliers lam (which enter K) and load factor s."""
-        point, model = self.point(q, lam, s), self.model
-        b = model.derivatives.blocks(point)
-        G = b.phi_q.toarray()
-        r, K = b.r2, b.r2_q.toarray()
-        r_s = b.r2_u[:, :, 0] @ np.where(self.scaled, self.u, 0.0)
-        if self._bare is not None:
-            bare: Blocks = self._bare.derivatives.blocks(point)
-            share = r - bare.r2
-            r, K = bare.r2 + s * share, bare.r2_q.toarray() + s * (K - bare.r2_q.toarray())
-            bare_s = bare.r2_u[:, :, 0] @ np.where(self.scaled, self.u, 0.0)
-            r_s = share + bare_s + s * (r_s - bare_s)
-        f, C, M = r - G.T @ lam, b.r2_v.toarray(), b.r2_a.toarray()
-        phi_s = b.r3_u[:, :, 0] @ np.where(self.scaled, self.u, 0.0)
-        blocks = RestBlocks(f, K, C, M, b.r3.copy(), G, r_s, phi_s)
+        point = self.point(q, lam, s)
+        b, growing = self._loaded(point, s)
+        G, by_s = b.phi_q.toarray(), np.where(self.scaled, self.u, 0.0)
+        f, K, C, M = b.r2 - G.T @ lam, b.r2_q.toarray(), b.r2_v.toarray(), b.r2_a.toarray()
+        blocks = RestBlocks(f, K, C, M, b.r3.copy(), G, growing + b.r2_u[:, :, 0] @ by_s, b.r3_u[:, :, 0] @ by_s)
         self._put_integrators(blocks, q, s)
         return blocks
+
+    def blocks(self, point: OperatingPoint, s: float) -> Blocks:
+        """The model's equations at a point, with loads at load factor s."""
+        return self._loaded(point, s)[0]
+
+    def _loaded(self, point: OperatingPoint, s: float) -> tuple[Blocks, np.ndarray]:
+        """The equations at load factor s, and the rows of the elements that it multiplies."""
+        whole = self.model.derivatives.blocks(point)
+        if self._bare is None:
+            return whole, np.zeros_like(whole.r2)
+        bare = self._bare.derivatives.blocks(point)
+        mixed = {
+            name: (1.0 - s) * getattr(bare, name) + s * getattr(whole, name)
+            for name in ("r2", "r2_q", "r2_v", "r2_a", "r2_u")
+        }
+        return whole._replace(**mixed), whole.r2 - bare.r2
 
     def _find_integrators(self) -> list[tuple[int, Call, int]]:
         """(coordinate, call, place among its own) of integrals: of second order, and in no row of their own at rest."""

@@ -38,8 +38,8 @@ NEAR, CONVERGED = 1e-6, 1e-10
 MAX_ITERATIONS = 300
 CLOSED, MAX_CLOSING = 1e-12, 12
 """Constraint error after a step [m or -], and iterations to get there."""
-LEFT = 1e-8
-"""Force along a free motion over the forces that cancel, up to which it is balanced."""
+LEFT, ROUNDING = 1e-8, 1e-14
+"""Force along a free motion over the forces that cancel, up to which it is balanced, and rounding of a position."""
 SOFT = 1e-9
 """Stiffness of the softest motion over that of the stiffest, below which it is free."""
 TURNED = 0.9
@@ -180,7 +180,10 @@ def static_equilibrium(
 
 def equilibrium_at(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float, iterations: int) -> Equilibrium:
     """A position of rest with its multipliers as an Equilibrium, linearised there."""
-    linear = linearise(equations.model, equations.point(q, lam, s), held=np.flatnonzero(equations.held))
+    point = equations.point(q, lam, s)
+    linear = linearise(
+        equations.model, point, held=np.flatnonzero(equations.held), blocks=equations.blocks(point, s)
+    )
     return Equilibrium(equations.model, equations, s, q, lam, iterations, linear)
 
 
@@ -219,10 +222,12 @@ def relaxed(equations: RestEquations, q: np.ndarray, s: float) -> tuple[np.ndarr
 
 
 def _balanced_forces(model: Model, b: RestBlocks, lam: np.ndarray, at_start: float) -> bool:
-    """Whether what is left along the free motions is small beside the forces that cancel there, or were at the start."""
+    """Whether what is left along free motions is small beside forces that cancel there, or those of the start."""
     left = np.abs(basis(model, b.G).T @ b.f)
     parts = np.abs(b.f) + np.abs(b.G.T) @ np.abs(lam)
-    return bool(np.all(left <= LEFT * max(float(parts.max(initial=0.0)), at_start)))
+    # Where no force acts at all, what is left is the rounding of positions times stiffness.
+    rounding = ROUNDING * float(np.max(np.abs(b.K) @ model.tables.values.scale_q, initial=0.0))
+    return bool(np.all(left <= LEFT * max(float(parts.max(initial=0.0)), at_start) + rounding))
 
 
 def _balanced(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float) -> tuple[np.ndarray, RestBlocks]:
