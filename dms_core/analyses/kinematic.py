@@ -23,6 +23,7 @@ from dms_core.assembly.residual import evaluate_inputs
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, ModelError, SimulationError, choices
 from dms_core.linear.rank import independent_rows
+from dms_core.memory import check_memory
 from dms_core.model.system import System
 from dms_core.results import States
 
@@ -167,7 +168,7 @@ def kinematic(
         The motion, up to a singular position that it cannot leave if there is one (`failure` names it).
 
     Raises:
-        InputError: times do not rise, or begin before 0.
+        InputError: times do not rise, begin before 0, or are more than memory holds the motion of.
         ModelError: a driver is missing, or two drive the same coordinate; names the motion or the drivers.
 
     Example:
@@ -178,6 +179,7 @@ def kinematic(
     times = np.atleast_1d(np.asarray(times, float))
     if not len(times) or not np.isfinite(times).all() or times[0] < 0.0 or np.any(np.diff(times) <= 0.0):
         raise InputError("times: Expected finite, rising times from 0 s on.")
+    check_memory("times", len(times), 3 * compiled.n_q + 2 * compiled.n_phi)
     driven = Driven(compiled)
     walk, failure = _Walk(driven), ""
     rows = []

@@ -181,9 +181,7 @@ def static_equilibrium(
 def equilibrium_at(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float, iterations: int) -> Equilibrium:
     """A position of rest with its multipliers as an Equilibrium, linearised there."""
     point = equations.point(q, lam, s)
-    linear = linearise(
-        equations.model, point, held=np.flatnonzero(equations.held), blocks=equations.blocks(point, s)
-    )
+    linear = linearise(equations.model, point, held=np.flatnonzero(equations.held), blocks=equations.blocks(point, s))
     return Equilibrium(equations.model, equations, s, q, lam, iterations, linear)
 
 

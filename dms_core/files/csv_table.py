@@ -66,9 +66,7 @@ def read_table(path: str | Path, wanted: tuple[str, ...] = ()) -> CsvTable:
         raise InputError(f"table '{path}' is empty. Expected a line of column names, then lines of numbers.")
     for name in names:
         if names.count(name) > 1:
-            raise InputError(
-                f"table '{path}': column '{name}' stands {names.count(name)} times; expected one of a name."
-            )
+            raise InputError(f"table '{path}': column '{name}' stands {names.count(name)} times; expected it once.")
     for name in wanted:
         if name not in names:
             raise _no_column(path, name, names)

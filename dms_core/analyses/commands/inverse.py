@@ -101,20 +101,23 @@ def _motion(system: System, path: Path | None, cutoff: float | None) -> tuple[di
     check_times(times, "time_s", times.column("time_s"), None)
     heads = read_heads(path)
     joints = [e.name for e in (*system.constraints, *system.sensors) if isinstance(e, Revolute | Slider | JointAngle)]
-    found: dict[str, AnySignal] = {}
+    named: dict[str, str] = {}
     for column in heads:
         name = next((j for j in joints if column.startswith(j) and column[len(j) :] in ENDINGS), None)
         if name is None:
             continue
-        if name in found:
+        if name in named:
             raise InputError(f"--motion '{path}': two columns are named after '{name}'; expected one.")
-        unit = column.rpartition("_")[2] if column.endswith(("_deg", "_mm")) else None
-        found[name] = Table(file=str(path), column=column, unit=unit, interpolation="quintic", cutoff=cutoff)
-    if not found:
+        named[name] = column
+    if not named:
         raise InputError(
             f"--motion '{path}': no column is named after a joint or a joint_angle sensor. Columns: {choices(heads)}. "
             f"Joints and sensors: {choices(joints)}."
         )
+    found: dict[str, AnySignal] = {}
+    for name, column in named.items():
+        unit = column.rpartition("_")[2] if column.endswith(("_deg", "_mm")) else None
+        found[name] = Table(file=str(path), column=column, unit=unit, interpolation="quintic", cutoff=cutoff)
     return found, times.column("time_s")
 
 

@@ -1,4 +1,4 @@
-"""The dynamics of a model in its independent coordinates, solved without the linearisation: what it is tested against."""
+"""The dynamics of a model in its independent coordinates, by Newton's method, to test a linearisation."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class Charted:
     def __init__(self, model, linear) -> None:  # noqa: ANN001
         names = list(model.layout.names)
         self.model = model
-        self.z = [names.index(s[2:]) for s in linear.states if s[0] == "q" and model.second_order[names.index(s[2:])]]
-        self.s = [names.index(s[2:]) for s in linear.states if s[0] == "q" and not model.second_order[names.index(s[2:])]]
+        self.z = [k for k in (names.index(s[2:]) for s in linear.states if s[0] == "q") if model.second_order[k]]
+        self.s = [k for k in (names.index(s[2:]) for s in linear.states if s[0] == "q") if not model.second_order[k]]
         self.second = np.flatnonzero(model.second_order)
         self.guess = linear.point
 
@@ -65,7 +65,7 @@ class Charted:
         return v, a, lam
 
 
-def differences(f, x: np.ndarray, u: np.ndarray, h: float = 1e-5) -> tuple[np.ndarray, ...]:
+def differences(f, x: np.ndarray, u: np.ndarray, h: float = 1e-6) -> tuple[np.ndarray, ...]:
     """(A, [B, B_rate, B_acceleration], C, [D, ...]) by central differences of the charted dynamics."""
     columns = []
     for k in range(len(x)):

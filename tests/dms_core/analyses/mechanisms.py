@@ -99,9 +99,7 @@ def spring_mass_chain(n: int, mass: float, stiffness: float, damping: float = 0.
         )
         for k, (a, b) in enumerate(zip(names[:-2], names[1:-1], strict=True))
     ]  # fmt: skip
-    last = SpringDamper(
-        name="last", body_j=names[n], point_i=(n + 1.0, 0.0, 0.0), stiffness=stiffness, damping=damping
-    )
+    last = SpringDamper(name="last", body_j=names[n], point_i=(n + 1.0, 0.0, 0.0), stiffness=stiffness, damping=damping)
     tracks = [LineGuide(name=f"track{k}", body_j=b.name, axis_i=(1.0, 0.0, 0.0)) for k, b in enumerate(bodies)]
     return System("chain", bodies=bodies, constraints=tracks, forces=[*springs, last])
 

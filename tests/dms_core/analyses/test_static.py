@@ -196,7 +196,10 @@ class TestLoadSteps:
         [
             ({"steps": 0, "loads": ["weight"]}, "steps: Expected a positive whole number of load steps, got 0."),
             ({"steps": 3}, "loads: Expected the names of the loads"),
-            ({"loads": ["wait"]}, "load 'wait': Expected an input, or a force element without coordinates. There are: "),
+            (
+                {"loads": ["wait"]},
+                "load 'wait': Expected an input, or a force element without coordinates. There are: ",
+            ),
             ({"inputs": {"P": math.nan}}, "input 'P': Expected a finite number, got nan."),
         ],
     )
