@@ -1,7 +1,8 @@
 """Stick figures of a model: where it rests, and how its modes move it.
 
-A body is the lines between the points at which joints, springs, ropes and muscles hold it, and its centre of mass; a
-path or a spring is a thin line. Everything is seen along the direction in which the model is flattest.
+A body is the outline of the points at which joints, springs, ropes and muscles hold it, and of its centre of mass; a
+path or a spring is a thin line. Everything is seen along the direction in which the model is flattest. A mode is drawn
+as large as it can be seen, brought back onto the constraints, so that joints stay together.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from dms_core.model.geometry.path import PathPoint
 FORMATS = (".png", ".svg", ".pdf")
 RESOLUTION = 130
 """[dots per inch]"""
-LARGEST = 0.15
-"""Amplitude of a drawn mode over the size of the model."""
+LARGEST, CLOSINGS = 0.08, 8
+"""Amplitude of a drawn mode over the size of the model, and steps that bring it back onto the constraints."""
 MOST = 8
 """Modes in one picture: the slowest that move a body."""
 REST, FORTH, BACK, CORD = "#9AA0A6", "#0072B2", "#D55E00", "#C9A227"
 
 Lines = list[tuple[str, np.ndarray]]
-"""(body, or '' for a cord) and the corners of each line, shape (k, 3)."""
+"""(body, or '' for a cord) and the points of each, shape (k, 3)."""
 
 
 def require_matplotlib() -> None:
@@ -85,11 +86,7 @@ def lines(model: Model, q: np.ndarray) -> Lines:
     """Lines of the figure at a position, in ground axes [m]."""
     found: Lines = []
     for name, points in attachments(model).items():
-        at = [_placed(model, q, name, p) for p in points]
-        if len(at) == 3:
-            # The centre of mass is no corner of a rod.
-            at = at[1:]
-        found += [(name, np.array([a, b])) for k, a in enumerate(at) for b in at[:k]] or [(name, np.array(at))]
+        found.append((name, np.array([_placed(model, q, name, p) for p in points])))
     for cord in _cords(model):
         found.append(("", np.array([_placed(model, q, b, model.system.arm(b, p)) for b, p in cord])))
     return found
@@ -175,9 +172,10 @@ def _draw(ax: Any, linear: Linearisation, mode: Mode) -> None:
     model, q = linear.model, linear.point.q
     rest = lines(model, q)
     axes, amplitude = view(rest), LARGEST * figure_size(rest) / _sway(linear, mode)
-    for sign, colour, width, depth in ((-1.0, BACK, 1.2, 2), (1.0, FORTH, 2.0, 3)):
-        _stroke(ax, lines(model, q + sign * amplitude * mode.shape.real), axes, colour, width, depth)
-    _stroke(ax, rest, axes, REST, 1.2, 1)
+    for sign, colour, depth in ((-1.0, BACK, 2), (1.0, FORTH, 3)):
+        moved = closed_again(model, q, q + sign * amplitude * mode.shape.real)
+        _stroke(ax, lines(model, moved), axes, colour, depth)
+    _stroke(ax, rest, axes, REST, 1)
     swing = f"{mode.damped_frequency:.3g} Hz" if mode.damped_frequency else f"{mode.time_constant:.3g} s"
     ax.set_title(f"{swing}, damping {mode.damping:.3g}", fontsize=9)
     ax.set_aspect("equal")
@@ -185,13 +183,53 @@ def _draw(ax: Any, linear: Linearisation, mode: Mode) -> None:
     ax.margins(0.08)
 
 
-def _stroke(ax: Any, figure: Lines, axes: np.ndarray, colour: str, width: float, depth: int) -> None:
-    """Draw the lines of a figure."""
+def closed_again(model: Model, rest: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """The position q brought back to where constraints are as open as at rest, by steps of least norm."""
+    if not model.n_phi:
+        return q
+    known = model.constraint_jacobian(rest)[0]
+    for _ in range(CLOSINGS):
+        phi, _, G, _ = model.constraint_jacobian(q)
+        q = q - np.linalg.lstsq(G, phi - known, rcond=1e-10)[0]
+    return q
+
+
+def _stroke(ax: Any, figure: Lines, axes: np.ndarray, colour: str, depth: int) -> None:
+    """Draw a figure: bodies as outlines, cords as thin lines."""
     for body, points in figure:
-        x, y = axes @ points.T
-        if body and len(points) == 1:
-            ax.plot(x, y, "o", color=colour, markersize=5, zorder=depth)
-        elif body:
-            ax.plot(x, y, "-", color=colour, linewidth=width, zorder=depth, solid_capstyle="round")
-        else:
-            ax.plot(x, y, "-", color=CORD if colour == REST else colour, linewidth=0.5, alpha=0.6, zorder=depth)
+        flat = points @ axes.T
+        if not body:
+            cord = CORD if colour == REST else colour
+            ax.plot(*flat.T, "-", color=cord, linewidth=0.5, alpha=0.5, zorder=depth)
+            continue
+        corners = outline(flat)
+        if len(corners) == 1:
+            ax.plot(*corners.T, "o", color=colour, markersize=5, zorder=depth)
+            continue
+        ax.fill(*corners.T, facecolor=colour, alpha=0.12, zorder=depth)
+        ax.plot(*np.vstack([corners, corners[:1]]).T, "-", color=colour, linewidth=1.4, zorder=depth)
+
+
+def outline(points: np.ndarray) -> np.ndarray:
+    """Corners of the convex hull of points in a plane, shape (k, 2): one for a point, two for a line.
+
+    Monotone chain (Andrew 1979).
+    """
+    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    if size < 1e-9:
+        return points[:1]
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
+    halves = []
+    for row in (ordered, ordered[::-1]):
+        half: list[np.ndarray] = []
+        for p in row:
+            while len(half) > 1 and _turn(half[-2], half[-1], p) <= 1e-9 * size * size:
+                half.pop()
+            half.append(p)
+        halves += half[:-1]
+    return np.array(halves)
+
+
+def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    """Twice the area of a triangle, positive to the left."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
