@@ -22,6 +22,7 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, ModelError, SimulationError, choices
+from dms_core.flags import Flag, Limits, input_values
 from dms_core.linear.rank import independent_rows
 from dms_core.memory import check_memory
 from dms_core.model.system import System
@@ -81,6 +82,12 @@ class KinematicResult:
     def t(self) -> np.ndarray:
         """Times [s], shape (n,)."""
         return self.states.t
+
+    @property
+    def flags(self) -> tuple[Flag, ...]:
+        """Elements that left the range they are meant for, as a rope that pushes, see `Trajectory.flags`."""
+        s = self.states
+        return Limits(s.model).left(s.t, s.q, s.lam, input_values(s.model, s.signals, s.t, s.behind))
 
     def sensors(self) -> dict[str, np.ndarray]:
         """Every component of every sensor by name, shape (n,) each."""

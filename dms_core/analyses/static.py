@@ -26,6 +26,7 @@ from dms_core.analyses.rest_equations import RestBlocks, RestEquations
 from dms_core.assembly.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError
+from dms_core.flags import Flag, Limits
 from dms_core.model.system import System
 from dms_core.results import States
 
@@ -76,11 +77,17 @@ class Equilibrium:
         return self.linearisation.stable
 
     @property
+    def flags(self) -> tuple[Flag, ...]:
+        """Elements that rest outside the range they are meant for, as a rope that pushes."""
+        u = self.point.u[None, :, 0]
+        return Limits(self.model).left(np.zeros(1), self.q[None], self.lam[None], u)
+
+    @property
     def sentence(self) -> str:
         """Stable or not, and how fast what is unstable leaves."""
         if self.stable:
             return "The equilibrium is stable."
-        return f"The equilibrium is unstable: a small disturbance grows {np.e:.3g}-fold in {1.0 / self.growth:.4g} s."
+        return f"The equilibrium is unstable: a small disturbance grows e-fold in {1.0 / self.growth:.4g} s."
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,8 @@ def inverse(
     said = [f"left out: {', '.join(result.left_out) or 'nothing'}"]
     if found is not None:
         said.append(f"largest load that the muscles cannot give: {np.abs(found.shortage).max():.4g}")
-    return ended(outputs, out, extremes, [*said, *(p.sentence for p in result.motion.singular)])
+    said += [*(p.sentence for p in result.motion.singular), *(flag.sentence for flag in result.motion.flags)]
+    return ended(outputs, out, extremes, said)
 
 
 def _motion(system: System, path: Path | None, cutoff: float | None) -> tuple[dict[str, AnySignal], np.ndarray | None]:
@@ -136,4 +137,5 @@ def _statistics(result: InverseResult) -> dict[str, object]:
         "left_out": list(result.left_out),
         "newton_iterations": result.motion.iterations,
         "singular_positions": [{"t": p.t, "motion": p.words} for p in result.motion.singular],
+        "flags": [flag.as_dict() for flag in result.motion.flags],
     }

@@ -55,8 +55,10 @@ def kinematic(
         }  # fmt: skip
         singular = [{"t": p.t, "motion": p.words} for p in result.singular]
         if stats is not None:
-            write_json(stats, {**summary, "singular_positions": singular, "failure": result.failure})
-    return ended(outputs, out, summary, [p.sentence for p in result.singular], result.failure)
+            flags = [flag.as_dict() for flag in result.flags]
+            write_json(stats, {**summary, "singular_positions": singular, "failure": result.failure, "flags": flags})
+    said = [*(p.sentence for p in result.singular), *(flag.sentence for flag in result.flags)]
+    return ended(outputs, out, summary, said, result.failure)
 
 
 def sample_times(model: Model, start: float, end: float, sample: float) -> np.ndarray:

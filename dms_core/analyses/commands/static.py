@@ -66,11 +66,12 @@ def static(
             write_json(stats, _statistics(points, path))
     last = points[-1]
     events = [f"{event.kind} at load factor {event.load:.8g}: {event.words}" for event in (path.events if path else ())]
+    flags = [f"{f.kind} '{f.element}': {f.what}: {f.worst:.6g} {f.unit}." for f in last.flags]
     failure = ""
     if path is not None and not path.reached:
         failure = f"the path ends at load factor {last.load:.6g}, before {to:g}."
     summary = {"equilibria": len(points), "load factor": last.load, "largest growth rate [1/s]": last.growth}
-    return ended(outputs, out, summary, [*events, last.sentence], failure)
+    return ended(outputs, out, summary, [*events, last.sentence, *flags], failure)
 
 
 def _solved(
@@ -121,4 +122,5 @@ def _statistics(points: Sequence[Equilibrium], path: EquilibriumPath | None) -> 
         "eigenvalues": [[float(x.real), float(x.imag)] for x in last.linearisation.eigenvalues],
         "coordinates": list(last.model.layout.names),
         "events": events,
+        "flags": [{"element": f.element, "kind": f.kind, "what": f.what, "value": f.worst} for f in last.flags],
     }

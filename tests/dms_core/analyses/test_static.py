@@ -23,6 +23,7 @@ from dms_core.model import (
     Revolute,
     RopeActuator,
     RopeForce,
+    RopeLength,
     SpringDamper,
     System,
 )
@@ -242,8 +243,22 @@ class TestNoSingleAnswer:
         with pytest.raises(SimulationError, match=r"no equilibrium was found.*'stone' moves along \(0, 1, 0\)"):
             static_equilibrium(system)
 
-    def test_an_indifferent_pendulum_becomes_stable_with_a_spring(self):
-        system = spring_mass_chain(3, 1.0, 100.0)
-        last = static_equilibrium(Model(system)).last
+    def test_a_chain_of_springs_is_stable_and_says_so(self):
+        last = static_equilibrium(Model(spring_mass_chain(3, 1.0, 100.0))).last
         assert last.stable
         assert last.sentence == "The equilibrium is stable."
+        assert last.flags == ()
+
+    def test_a_rope_that_pushes_is_flagged(self):
+        """A ball that starts upright on its rope: an equilibrium, unstable, and none of a real rope."""
+        system = System(
+            "balanced", bodies=[PointMass(name="ball", mass=1.0, position=(0.0, 1.0, 0.0))],
+            constraints=[RopeLength(name="rope", path=[{"point": (0.0, 0.0, 0.0)},
+                                                       {"body": "ball", "point": (0.0, 0.0, 0.0)}])],
+            forces=[Gravity(name="weight", acceleration=(0.0, -G, 0.0))],
+        )  # fmt: skip
+        last = static_equilibrium(system).last
+        (flag,) = last.flags
+        assert flag.element == "rope" and flag.worst == pytest.approx(-G)
+        assert not last.stable and last.growth == pytest.approx(math.sqrt(G), rel=1e-9)
+        assert last.sentence.startswith("The equilibrium is unstable: a small disturbance grows e-fold in 0.319")
