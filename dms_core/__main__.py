@@ -1,8 +1,12 @@
-"""Command line of the DMS platform: check, run and describe model files.
+"""Command line of the DMS platform: check, run, analyse and describe model files.
 
 python -m dms_core check MODEL.yaml
 python -m dms_core run MODEL.yaml --t-end T --rtol R [--method NAME] [--sample DT] --out FILE.csv
                                       [--stats FILE.json] [--overwrite]
+python -m dms_core static MODEL.yaml --out FILE.csv [--loads NAME ...] [--steps N | --follow --to S]
+python -m dms_core kinematic MODEL.yaml --t-end T --sample DT --out FILE.csv
+python -m dms_core inverse MODEL.yaml --motion FILE.csv --out FILE.csv [--muscles FILE.csv]
+python -m dms_core modes MODEL.yaml --out FILE.csv [--matrices FILE.json] [--pictures FILE.png]
 python -m dms_core schema [--out FILE] [--overwrite]
 """
 
@@ -18,13 +22,17 @@ import numpy as np
 from tyro.conf import Positional, arg
 
 from dms_core import Model, Simulation, SolverOptions, Trajectory
+from dms_core.analyses.commands.inverse import inverse
+from dms_core.analyses.commands.kinematic import kinematic
+from dms_core.analyses.commands.modes import modes
+from dms_core.analyses.commands.static import static
 from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_command
-from dms_core.errors import DmsError, InputError, Stopped
-from dms_core.files.output_file import check_columns, check_size, with_unit, write_csv, write_json, write_text
+from dms_core.errors import InputError, Stopped
+from dms_core.files.output_file import check_columns, check_size, write_csv, write_json, write_text
 from dms_core.files.output_place import descriptor
 from dms_core.files.outputs import OutputFile, Outputs, partial
-from dms_core.model_file import load
-from dms_core.results import Result, States
+from dms_core.model_tables import columns, compiled, heads
+from dms_core.results import Result
 from dms_core.schema import reference
 from dms_core.simulation.options import MethodName
 
@@ -40,15 +48,6 @@ def check(model: Positional[Path]) -> int:
     """
     print(report(compiled(model)))
     return 0
-
-
-def compiled(path: Path) -> Model:
-    """The model of a file; whatever is wrong with it names the file."""
-    system = load(path)
-    try:
-        return Model(system)
-    except DmsError as error:
-        raise type(error)(f"{path}: {error}") from None
 
 
 def report(model: Model) -> str:
@@ -185,20 +184,6 @@ def table(trajectory: Trajectory, sample: float | None) -> Iterator[dict[str, np
         yield columns(trajectory.at(times[k : k + ROWS]))
 
 
-def heads(model: Model) -> list[str]:
-    """Names of the columns: time, sensors with their unit, coordinates 'q.*' and their rates 'v.*'."""
-    layout = model.layout
-    coordinates = [f"{kind}.{name}" for kind in "qv" for name in layout.names]
-    return ["time_s", *(with_unit(name, unit) for name, unit in layout.outputs), *coordinates]
-
-
-def columns(states: States) -> dict[str, np.ndarray]:
-    """Columns of given states."""
-    measured = states.sensors()
-    found = [states.t, *(measured[name] for name, _ in states.model.layout.outputs), *states.q.T, *states.v.T]
-    return dict(zip(heads(states.model), found, strict=True))
-
-
 def schema(
     out: Annotated[FileOut | None, arg(help="file to write; default: standard output")] = None,
     overwrite: Annotated[bool, arg(help="replace a file of this name")] = False,
@@ -215,9 +200,17 @@ def schema(
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; a mistake of the user is one message on stderr and status 2."""
     return run_command(
-        {"check": check, "run": run, "schema": schema},
+        {
+            "check": check,
+            "run": run,
+            "static": static,
+            "kinematic": kinematic,
+            "inverse": inverse,
+            "modes": modes,
+            "schema": schema,
+        },
         "python -m dms_core",
-        "Check, run and describe models of multibody systems with ropes, muscles and controllers.",
+        "Check, run, analyse and describe models of multibody systems with ropes, muscles and controllers.",
         arguments,
     )
 

@@ -121,6 +121,8 @@ def _declaration(path: str | Path, section: str, item: Any) -> Declaration:
         others = [s for s in BRANCHES if kind in list(kinds(s))]
         hint = f" It belongs under '{others[0]}'." if others else ""
         raise ModelError(f"{where}: {who}: unknown kind {shown(kind)}.{hint} Kinds of {section}: {choices(allowed)}.")
+    if section == "inputs":
+        data = _beside(path, data)
     try:
         declaration = allowed[kind](**data)
     except DmsError as error:
@@ -128,6 +130,15 @@ def _declaration(path: str | Path, section: str, item: Any) -> Declaration:
     if isinstance(declaration, Input) and isinstance(declaration.signal, Function):
         raise ModelError(f"{where}: {who}: a signal of kind 'function' is Python code; declare it in Python.")
     return declaration
+
+
+def _beside(path: str | Path, data: dict[str, Any]) -> dict[str, Any]:
+    """An input whose table, if it has one, is found from the folder of the model file."""
+    signal = data.get("signal")
+    if not isinstance(signal, dict) or signal.get("kind") != "table" or not isinstance(signal.get("file"), str):
+        return data
+    file = Path(path).resolve().parent / signal["file"] if signal["file"] else ""
+    return {**data, "signal": {**signal, "file": str(file)}}
 
 
 def dump(system: System) -> str:

@@ -14,6 +14,7 @@ from dms_core.assembly.tables import Signals
 from dms_core.dense_output import Rates, cubic, quintic
 from dms_core.errors import DmsError, InputError, SimulationError, choices
 from dms_core.flags import Flag, Limits, input_values
+from dms_core.memory import check_memory
 
 
 class Result(Enum):
@@ -185,14 +186,20 @@ class Trajectory:
         """Times 0, sample, 2 sample, ... of the run, and its end [s].
 
         Raises:
-            InputError: `sample` is no positive time.
+            InputError: `sample` is no positive time, or states at these times take more memory than is free.
         """
         if not (np.isfinite(sample) and sample > 0.0):
             raise InputError(f"sample: Expected a positive time, got {sample} s.")
         end = self.t[-1]
+        check_memory(f"sample: {sample:g} s", end / sample + 1.0, self._numbers_a_state)
         # A multiple of `sample` that rounding puts just behind the end still counts.
         times = np.minimum(np.arange(int(np.floor(end / sample * (1.0 + 1e-12))) + 1) * sample, end)
         return times if end - times[-1] < 1e-9 * sample else np.append(times, end)
+
+    @property
+    def _numbers_a_state(self) -> int:
+        """Numbers that a state and its sensors take."""
+        return 1 + 3 * self.model.n_q + 2 * self.model.n_phi + len(self.model.layout.outputs)
 
     def own_steps(self) -> States:
         """States on the solver's own steps."""

@@ -25,7 +25,7 @@ def answer(name: str) -> str:
 
 
 def numbers(text: str, pattern: str) -> list[float]:
-    return [float(x) for x in re.findall(pattern, text)]
+    return [float(x) for x in re.findall(pattern, text, re.MULTILINE)]
 
 
 def falling(values: list[float]) -> bool:
@@ -45,6 +45,13 @@ CHECKS = {
     "readings": lambda said: "drawn: " in said,
     # The multiplier of the driver at rest is the moment of gravity.
     "inverse_dynamics": lambda said: len(set(numbers(said, r"(?:1\.4 s: +|gives )(\S+) Nm"))) == 1,
+    # The device holds every weight at 60 deg; what muscles hold sinks as it grows.
+    "arm_at_rest": lambda said: (
+        said.count(" 60.00 deg (stable)") == 5
+        and falling([float(x) for x in re.findall(r"kg   rests at +(\S+) deg", said)])
+    ),
+    "arm_modes": lambda said: "stable" in said and "gain 1.0000" in said,
+    "muscles_from_motion": lambda said: max(numbers(said, r"rms error (\S+)$")) < 0.003,
     "pid_tuning": lambda said: falling(numbers(said, r"rms error (\S+) deg")),
     "sb3_training": lambda said: len(numbers(said, r"20 episodes: (\S+)")) == 1,
 }

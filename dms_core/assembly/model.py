@@ -230,13 +230,18 @@ class Model:
         evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
         return open_call(self.layout, Packed(dynamics).table, self._constraints.table, packed.table)
 
-    def constraint_jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[np.ndarray, ...]:
-        """(phi, phi_q v + phi_t, phi_q, (phi_q v)_q) at q, v: shapes (n_phi,), (n_phi,), (n_phi, n_q) twice."""
+    def constraint_jacobian(
+        self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: bool = False
+    ) -> tuple[np.ndarray, ...]:
+        """(phi, phi_q v + phi_t, phi_q, (phi_q v)_q) at q, v: shapes (n_phi,), (n_phi,), (n_phi, n_q) twice.
+
+        `before` takes the inputs from the left of a jump at t.
+        """
         w = self.new_work()
         w.q[: self.n_q] = q
         w.v[: self.n_q] = 0.0 if v is None else v
         packed = Packed(w)
-        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
+        evaluate_inputs(Packed(self._signals).table, t, before, packed.table)
         G, W = np.zeros((self.n_phi, self.n_q + 7)), np.zeros((self.n_phi, self.n_q + 7))
         dense_constraints(self._constraints.table, packed.table, G, W)
         return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]

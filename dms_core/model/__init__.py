@@ -67,7 +67,18 @@ from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSens
 from dms_core.model.sensors.force_load import ForceLoad
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
-from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, MinimumJerk, Spline, Steps
+from dms_core.model.signals import (
+    Constant,
+    Function,
+    Harmonic,
+    Input,
+    Lines,
+    MinimumJerk,
+    Samples,
+    Spline,
+    Steps,
+    Table,
+)
 from dms_core.model.system import System
 
 __all__ = [
@@ -133,6 +144,7 @@ __all__ = [
     "RopeForce",
     "RopeLength",
     "RopeSensor",
+    "Samples",
     "Screw",
     "SecondOrder",
     "Slider",
@@ -141,6 +153,7 @@ __all__ = [
     "SpringDamper",
     "Steps",
     "System",
+    "Table",
     "ThelenCurves",
     "ThelenMuscle",
     "TorsionSpring",

@@ -9,14 +9,18 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
-from scipy.interpolate import CubicSpline
+from pydantic import Field, PrivateAttr, model_validator
+from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
+from dms_core.files.csv_table import check_times, read_table, unit_factor
 from dms_core.model.element import Declaration
+from dms_core.model.smoothing import low_pass
 from dms_core.validation import Checked
 
 DEGREE = 5
 """Highest degree of a polynomial piece: a minimum-jerk movement is a quintic (Flash and Hogan 1985)."""
+SPLINES = {"lines": 1, "cubic": 3, "quintic": 5}
+"""Degree of the pieces between the rows of a table."""
 
 
 class Pieces(NamedTuple):
@@ -127,6 +131,97 @@ class MinimumJerk(_Table):
         return Pieces(np.concatenate([[t[0] - 1.0], t]), c, np.zeros(0))
 
 
+class _Recorded(Signal):
+    """Values at many times, joined and perhaps filtered."""
+
+    interpolation: Literal["lines", "cubic", "quintic"] = Field(default="lines", description="between the rows")
+    cutoff: float | None = Field(
+        default=None,
+        gt=0.0,
+        description="cut-off of a low-pass filter [Hz]: Butterworth of order 2, both ways; default: no filter",
+    )
+
+    def rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times [s] and values, as recorded."""
+        raise NotImplementedError
+
+    def what(self) -> str:
+        """Whose values they are, for errors."""
+        return f"'{self.kind}'"  # type: ignore[attr-defined]
+
+    @model_validator(mode="after")
+    def _enough(self):
+        t, x = self.rows()
+        least = SPLINES[self.interpolation] + 1
+        if len(t) < least:
+            raise ValueError(
+                f"{self.what()}: Expected at least {least} rows for interpolation '{self.interpolation}', got {len(t)}"
+            )
+        if self.cutoff is not None:
+            low_pass(t, x, self.cutoff, self.what())
+        return self
+
+    def pieces(self) -> Pieces:
+        """Pieces of degree 1, 3 or 5 between the rows, constant outside."""
+        t, x = self.rows()
+        if self.cutoff is not None:
+            x = low_pass(t, x, self.cutoff, self.what())
+        if self.interpolation == "lines":
+            return Lines(times=tuple(t), values=tuple(x)).pieces()
+        spline = PPoly.from_spline(make_interp_spline(t, x, k=SPLINES[self.interpolation]))
+        inside = np.diff(spline.x) > 0.0
+        c = np.zeros((int(inside.sum()) + 2, DEGREE + 1))
+        c[0, 0], c[-1, 0] = x[0], x[-1]
+        c[1:-1, : len(spline.c)] = spline.c[::-1, inside].T
+        return Pieces(np.concatenate([[t[0] - 1.0], spline.x[:-1][inside], [t[-1]]]), c, t[[0, -1]])
+
+
+class Samples(_Recorded, _Table):
+    """Samples of a motion, a load or a command, joined as in a table; constant outside."""
+
+    kind: Literal["samples"] = "samples"
+
+    def rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times and values as given."""
+        return np.array(self.times), np.array(self.values)
+
+
+class Table(_Recorded):
+    """A column of a CSV file over a column of times: a recorded motion, a measured load, a command. Constant outside.
+
+    A relative file name counts from the folder of the model file. Cells must be finite numbers, and times must rise
+    without holes. 'lines' joins the rows by straight lines, and the solver lands on each row; 'cubic' and 'quintic' are
+    splines through them, C2 and C4 inside, as what moves a driver must be.
+    """
+
+    kind: Literal["table"] = "table"
+    file: str = Field(min_length=1, description="CSV file whose first line names the columns")
+    column: str = Field(min_length=1, description="column of the values")
+    time: str = Field(default="time_s", min_length=1, description="column of the times [s]")
+    unit: str | None = Field(
+        default=None, description="unit of the values where it is not of SI: deg, mm, cm, ms, kN, percent"
+    )
+    time_unit: str | None = Field(default=None, description="unit of the times where it is not s: ms")
+    longest_gap: float | None = Field(
+        default=None, gt=0.0, description="longest interval between rows that is no hole [s]; default: 5 usual ones"
+    )
+    _rows: tuple[tuple[float, ...], tuple[float, ...]] = PrivateAttr(default=((), ()))
+
+    def rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """The two columns, read once, in SI units."""
+        if not self._rows[0]:
+            table = read_table(self.file, (self.time, self.column))
+            times = unit_factor(self.file, self.time, self.time_unit) * table.column(self.time)
+            values = unit_factor(self.file, self.column, self.unit) * table.column(self.column)
+            check_times(table, self.time, times, self.longest_gap)
+            self._rows = (tuple(times.tolist()), tuple(values.tolist()))
+        return np.array(self._rows[0]), np.array(self._rows[1])
+
+    def what(self) -> str:
+        """File and column."""
+        return f"table '{self.file}', column '{self.column}'"
+
+
 class Harmonic(Signal):
     """offset + amplitude sin(2 pi frequency t + phase)."""
 
@@ -149,7 +244,7 @@ class Function(Signal):
 
 
 AnySignal = Annotated[
-    Constant | Steps | Lines | Spline | MinimumJerk | Harmonic | Function, Field(discriminator="kind")
+    Constant | Steps | Lines | Spline | MinimumJerk | Samples | Table | Harmonic | Function, Field(discriminator="kind")
 ]
 
 

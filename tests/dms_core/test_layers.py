@@ -16,11 +16,12 @@ import exo_env
 
 FOLDER = Path(dms_core.__file__).parent
 ABOVE = {
-    "linear": {"model", "assembly", "simulation"},
-    "model": {"linear", "assembly", "simulation"},
-    "assembly": {"simulation"},
-    "compiled": {"simulation", "linear"},
-    "files": {"compiled", "linear", "model", "assembly", "simulation"},
+    "linear": {"model", "assembly", "simulation", "analyses"},
+    "model": {"linear", "assembly", "simulation", "analyses"},
+    "assembly": {"simulation", "analyses"},
+    "compiled": {"simulation", "linear", "analyses"},
+    "simulation": {"analyses"},
+    "files": {"compiled", "linear", "model", "assembly", "simulation", "analyses"},
 }
 """What a folder must not import."""
 ORDER = {

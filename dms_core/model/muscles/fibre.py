@@ -30,8 +30,16 @@ from typing import NamedTuple
 
 from dms_core.bracket import narrowed, trial
 from dms_core.compiled.jit import compiled
-from dms_core.model.muscles.thelen_curves import active_force, force_velocity, passive_force, tendon_force
+from dms_core.model.muscles.thelen_curves import (
+    TOE_FORCE,
+    TOE_SHAPE,
+    active_force,
+    force_velocity,
+    passive_force,
+    tendon_force,
+)
 
+TOE_GROWTH = math.expm1(TOE_SHAPE)
 LEAST_COSINE = 0.1
 """Pennation is not let beyond acos(0.1), about 84 degrees."""
 SHORTEST = 0.01
@@ -123,6 +131,19 @@ def tendon_state(par, length, fibre):
     ft, ft_e = tendon_force((length - fibre * c) / Ls - 1.0, par[MUSCLE.toe_strain], par[MUSCLE.tendon_slope])
     by_length = F0 * ft_e / Ls
     return F0 * ft, by_length, -by_length * (c + fibre * c_l)
+
+
+@compiled
+def tendon_length(par, force):
+    """Length of the tendon that carries a force [m]: the inverse of the tendon curve."""
+    f, e_toe, k_lin = force / par[MUSCLE.F0], par[MUSCLE.toe_strain], par[MUSCLE.tendon_slope]
+    if f <= 0.0:
+        strain = 0.0
+    elif f <= TOE_FORCE:
+        strain = e_toe / TOE_SHAPE * math.log1p(f * TOE_GROWTH / TOE_FORCE)
+    else:
+        strain = e_toe + (f - TOE_FORCE) / k_lin
+    return par[MUSCLE.Ls] * (1.0 + strain)
 
 
 @compiled

@@ -20,11 +20,9 @@ from dms_core.model.muscles.fibre import (
     fibre_state,
     pennation_cosine,
     smallest_fibre,
+    tendon_length,
     tendon_state,
 )
-from dms_core.model.muscles.thelen_curves import TOE_FORCE, TOE_SHAPE
-
-TOE_GROWTH = math.expm1(TOE_SHAPE)
 
 
 class ArmTable(NamedTuple):
@@ -148,19 +146,6 @@ def with_weight(load, weight):
     return LoadTable(
         load.inertia, load.mass, load.centre_of_mass, load.grip, load.handle, weight, load.pulley, load.gravity
     )
-
-
-@compiled
-def tendon_length(par, force):
-    """Length of the tendon that carries a force [m]: the inverse of the tendon curve."""
-    f, e_toe, k_lin = force / par[MUSCLE.F0], par[MUSCLE.toe_strain], par[MUSCLE.tendon_slope]
-    if f <= 0.0:
-        strain = 0.0
-    elif f <= TOE_FORCE:
-        strain = e_toe / TOE_SHAPE * math.log1p(f * TOE_GROWTH / TOE_FORCE)
-    else:
-        strain = e_toe + (f - TOE_FORCE) / k_lin
-    return par[MUSCLE.Ls] * (1.0 + strain)
 
 
 @compiled

@@ -1,0 +1,1 @@
+"""The commands static, kinematic, inverse and modes of `python -m dms_core`."""
