@@ -19,6 +19,7 @@ from dms_core.model.constraints import (
     Slider,
     Spherical,
 )
+from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
 from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import GROUND
 from dms_core.model.forces import (
@@ -32,7 +33,16 @@ from dms_core.model.forces import (
 )
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
 from dms_core.model.ropes import PathPoint, RopeForce
-from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSensor, Point, RopeSensor, Tracking
+from dms_core.model.sensors import (
+    ContactSensor,
+    CoordinateSensor,
+    Imu,
+    JointAngle,
+    MuscleSensor,
+    Point,
+    RopeSensor,
+    Tracking,
+)
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
 from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, MinimumJerk, Spline, Steps
@@ -42,7 +52,9 @@ __all__ = [
     "GROUND",
     "AngleDriver",
     "Constant",
+    "ContactSensor",
     "CoordinateSensor",
+    "CylinderContact",
     "DelayedError",
     "Distance",
     "EulerNorm",
@@ -79,6 +91,8 @@ __all__ = [
     "RopeSensor",
     "SecondOrder",
     "Slider",
+    "SphereContact",
+    "SpherePairContact",
     "Spherical",
     "Spline",
     "SpringDamper",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
+from dms_core.simulation.events import Crossing, advance_to_crossing
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
@@ -32,12 +34,22 @@ WHOLE = 1e-6
 
 RESULT_OF = {
     OUTCOME.done: Result.SUCCESS,
+    OUTCOME.buffer_full: Result.SUCCESS,
     OUTCOME.step_too_small: Result.STEP_TOO_SMALL,
     OUTCOME.newton_failed: Result.NEWTON_FAILED,
     OUTCOME.matrix_singular: Result.MATRIX_SINGULAR,
     OUTCOME.too_many_steps: Result.TOO_MANY_STEPS,
     OUTCOME.rates_failed: Result.RATES_FAILED,
 }
+
+
+class Mark(NamedTuple):
+    """A place in time that a world can be put back to, with what it had recorded until then."""
+
+    time: float
+    snapshot: Snapshot
+    rows: int
+    """Pieces of the record."""
 
 
 class World(Inspection):
@@ -60,7 +72,12 @@ class World(Inspection):
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
+        self.crossing: Crossing | None = None
+        """What ended the last call of `advance`, where that was an event."""
+        self.crossed_at = -math.inf
+        """When that was [s]."""
         self._singular = ""
+        self._once = False
 
     @property
     def tables(self) -> Packed:
@@ -102,12 +119,27 @@ class World(Inspection):
         self.state.counts[COUNTS.restart] = 1
         return True
 
-    def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
+    def advance(
+        self,
+        t_end: float,
+        progress: Callable[[float], None] | None = None,
+        stop_at: Crossing | Sequence[Crossing] = (),
+    ) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.
+
+        Args:
+            t_end: end [s].
+            progress: called with the time reached.
+            stop_at: sensors whose passing of a value ends the call before t_end, see `Crossing`; `crossing` is then
+                the one that did. The last step lands on it.
 
         Returns:
             SUCCESS, or what stopped the run: what was computed is kept and finite.
         """
+        if stop_at:
+            self.result, self.crossing = advance_to_crossing(self, t_end, stop_at, progress)
+            return self.result
+        self.crossing = None
         if not (t_end == 0.0 or is_positive(t_end)) or t_end < self.time:
             raise InputError(f"t_end: Expected a time of at least the present {self.time:.6g} s, got {t_end} s.")
         try:
@@ -131,7 +163,25 @@ class World(Inspection):
             self._keep(self._buffer[:count])
             if progress is not None:
                 progress(self.time)
+            if self._once:
+                break
         return code
+
+    def advance_once(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
+        """One step towards t_end [s], or to it; as `advance` otherwise."""
+        whole, self._buffer, self._once = self._buffer, np.zeros((2, self._buffer.shape[1])), True
+        try:
+            return self.advance(t_end, progress)
+        finally:
+            self._buffer, self._once = whole, False
+
+    def mark(self) -> Mark:
+        """The present, to be put back to with `rewind`."""
+        return Mark(self.time, self.snapshot(), 0)
+
+    def rewind(self, past: Mark) -> None:
+        """Go back to a mark; what was recorded since is forgotten."""
+        self.restore(past.snapshot)
 
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""
@@ -287,6 +337,16 @@ class Simulation(World):
         # At the start and behind a jump the next step records where it begins, with rates that belong to it.
         present = np.concatenate([[self.time], s.q, s.v, s.vd, s.lam, s.mu])
         self._rows = [present[None]] if not s.counts[COUNTS.restart] else []
+
+    def mark(self) -> Mark:
+        """The present, to be put back to with `rewind`."""
+        return super().mark()._replace(rows=len(self._rows))
+
+    def rewind(self, past: Mark) -> None:
+        """Go back to a mark; what was recorded since is forgotten, and what was recorded before is kept."""
+        rows, settings = self._rows[: past.rows], self._settings
+        super().rewind(past)
+        self._rows, self._settings = rows, settings
 
     def trajectory(self) -> Trajectory:
         """Everything computed so far.

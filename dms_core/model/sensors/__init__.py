@@ -1,6 +1,7 @@
 """What can be measured: y = h(q, v, vdot, lam, mu, u) (paper sect. 2.4, eq. 5-6)."""
 
 from dms_core.model.sensors.angle import JointAngle
+from dms_core.model.sensors.contact import ContactSensor
 from dms_core.model.sensors.coordinate import CoordinateSensor
 from dms_core.model.sensors.imu import Imu
 from dms_core.model.sensors.muscle import MuscleSensor
@@ -9,6 +10,7 @@ from dms_core.model.sensors.rope import RopeSensor
 from dms_core.model.sensors.tracking import Tracking
 
 __all__ = [
+    "ContactSensor",
     "CoordinateSensor",
     "Imu",
     "JointAngle",
