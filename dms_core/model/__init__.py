@@ -21,6 +21,7 @@ from dms_core.model.constraints import (
 )
 from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
 from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
+from dms_core.model.electric import DcMotor
 from dms_core.model.element import GROUND
 from dms_core.model.forces import (
     FirstOrder,
@@ -32,7 +33,7 @@ from dms_core.model.forces import (
     SpringDamper,
 )
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
-from dms_core.model.ropes import PathPoint, RopeForce
+from dms_core.model.ropes import ElasticRope, PathPoint, RopeForce, Winch
 from dms_core.model.sensors import (
     ContactSensor,
     CoordinateSensor,
@@ -42,6 +43,7 @@ from dms_core.model.sensors import (
     Point,
     RopeSensor,
     Tracking,
+    WinchSensor,
 )
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
@@ -55,8 +57,10 @@ __all__ = [
     "ContactSensor",
     "CoordinateSensor",
     "CylinderContact",
+    "DcMotor",
     "DelayedError",
     "Distance",
+    "ElasticRope",
     "EulerNorm",
     "FirstOrder",
     "Fixed",
@@ -101,4 +105,6 @@ __all__ = [
     "ThelenCurves",
     "ThelenMuscle",
     "Tracking",
+    "Winch",
+    "WinchSensor",
 ]

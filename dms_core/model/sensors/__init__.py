@@ -8,6 +8,7 @@ from dms_core.model.sensors.muscle import MuscleSensor
 from dms_core.model.sensors.point import Point
 from dms_core.model.sensors.rope import RopeSensor
 from dms_core.model.sensors.tracking import Tracking
+from dms_core.model.sensors.winch import WinchSensor
 
 __all__ = [
     "ContactSensor",
@@ -18,4 +19,5 @@ __all__ = [
     "Point",
     "RopeSensor",
     "Tracking",
+    "WinchSensor",
 ]

@@ -100,7 +100,7 @@ def test_a_jump_of_an_input_counts_where_the_sensor_stands_behind_it():
 @pytest.mark.parametrize(
     ("crossing", "complaint"),
     [
-        (Crossing("at.x"), r"stop_at: sensor component 'at.x' does not exist. Declared: at.position.x"),
+        (Crossing("at.x"), r"stop_at: sensor component 'at.x' does not exist. Declared: at.acceleration.x"),
         (Crossing(X, 2), "way: Expected -1, 0 or 1, got 2"),  # type: ignore[arg-type]
         (Crossing(X, 1, math.nan), "value: Expected a finite number, got nan"),
     ],
