@@ -20,7 +20,15 @@ from dms_core.model.constraints import (
     Spherical,
 )
 from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
-from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
+from dms_core.model.control import (
+    DelayedError,
+    ImpedanceController,
+    Pid,
+    ReferenceFilter,
+    RopeActuator,
+    SensorPid,
+    StateSpace,
+)
 from dms_core.model.electric import DcMotor
 from dms_core.model.element import GROUND
 from dms_core.model.forces import (
@@ -94,12 +102,14 @@ __all__ = [
     "RopeLength",
     "RopeSensor",
     "SecondOrder",
+    "SensorPid",
     "Slider",
     "SphereContact",
     "SpherePairContact",
     "Spherical",
     "Spline",
     "SpringDamper",
+    "StateSpace",
     "Steps",
     "System",
     "ThelenCurves",

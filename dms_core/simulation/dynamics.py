@@ -101,6 +101,9 @@ class World(Inspection):
             InputError: the value is not finite, or the input is declared as a course in time.
         """
         k = self.model.input_index(name)
+        if name in self.model.layout.driven:
+            by = self.model.layout.driven[name].rpartition(".")[0]
+            raise InputError(f"input '{name}' is driven by '{by}'; only an input that nothing drives can be set.")
         signal = self.model.system.inputs[k].signal
         if not isinstance(signal, Constant):
             raise InputError(
