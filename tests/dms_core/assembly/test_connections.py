@@ -12,8 +12,10 @@ from dms_core.errors import InputError, ModelError
 from dms_core.model import (
     ContactSensor,
     CoordinateSensor,
+    CylinderContact,
     DcMotor,
     DelayedError,
+    ElasticRope,
     Gravity,
     Input,
     JointAngle,
@@ -31,12 +33,15 @@ from dms_core.model import (
     RopeSensor,
     SensorPid,
     SphereContact,
+    SpherePairContact,
     StateSpace,
     System,
+    Winch,
 )
 from dms_core.model.signals import Constant, Steps
 from dms_core.simulation.dynamics import SolverOptions, World, simulate
 
+TO_BALL = (PathPoint(point=(0.2, 1.0, 0.1)), PathPoint(body="ball", point=(0.0, 0.0, 0.0)))
 PATH = (PathPoint(point=(0.0, 1.5, 0.0)), PathPoint(body="arm", point=(0.5, 0.1, 0.0)))
 
 
@@ -78,6 +83,19 @@ def everything() -> System:
             DcMotor(name="motor", joint="hinge", voltage="volts", resistance=1.0, inductance=0.2, torque_constant=0.3),
             SphereContact(name="touch", body_j="ball", radius=0.5, stiffness=90.0, restitution=0.6,
                           impact_speed_input="speed"),
+            SpherePairContact(
+                name="pair", body_i="arm", body_j="ball", radius_i=0.3, radius_j=0.3, stiffness=90.0, friction=0.2,
+                slip_speed=0.1,
+            ),
+            CylinderContact(
+                name="roller", body_j="arm", point_i=(0.0, 0.5, 0.0), normal_i=(0.1, 1.0, 0.2), axis_j=(0.3, 0.2, 1.0),
+                radius=0.2, length=0.3, stiffness=30.0, friction=0.2, slip_speed=0.1,
+            ),
+            ElasticRope(name="tether", path=TO_BALL, axial_stiffness=20.0, free_length=0.8, damping=0.5),
+            Winch(
+                name="hoist", joint="hinge", radius=0.1, path=TO_BALL, axial_stiffness=20.0, free_length=0.7,
+                damping=0.5,
+            ),
         ],
         sensors=[
             RopeSensor(name="cell", rope="rope", components=("tension",)),
