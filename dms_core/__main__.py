@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 from tyro.conf import Positional, arg
 
-from dms_core import Model, Simulation, SolverOptions, Trajectory
+from dms_core import Model, SolverOptions, Trajectory
 from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_command
 from dms_core.errors import DmsError, InputError, Stopped
 from dms_core.files.output_file import check_columns, check_size, with_unit, write_csv, write_json, write_text
@@ -25,6 +25,7 @@ from dms_core.files.outputs import OutputFile, Outputs, partial
 from dms_core.model_file import load
 from dms_core.results import Result, States
 from dms_core.schema import reference
+from dms_core.simulation.dynamics import new_simulation
 
 ROWS = 10_000
 """Rows of a table in memory at once."""
@@ -145,7 +146,7 @@ def _simulated(model: Model, options: SolverOptions, t_end: float, sample: float
     for option, time in (("--sample", sample), ("--step", options.fixed_step)):
         if time is not None:
             check_size(option, t_end, time, len(names))
-    simulation = Simulation(model, options)
+    simulation = new_simulation(model, options)
     with bar_of_run(t_end) as bar:
         simulation.advance(t_end, moves(bar))
     return simulation.trajectory()

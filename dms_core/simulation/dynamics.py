@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +17,11 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
-from dms_core.simulation.events import Crossing, advance_to_crossing
+from dms_core.simulation.events import Crossing, Mark, advance_to_crossing
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
+from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
 from dms_core.simulation.step_control import OUTCOME
@@ -43,15 +43,6 @@ RESULT_OF = {
 }
 
 
-class Mark(NamedTuple):
-    """A place in time that a world can be put back to, with what it had recorded until then."""
-
-    time: float
-    snapshot: Snapshot
-    rows: int
-    """Pieces of the record."""
-
-
 class World(Inspection):
     """One world that is advanced in time, with inputs set between calls; it remembers the present only.
 
@@ -62,6 +53,7 @@ class World(Inspection):
 
     def __init__(self, model: Model | System, options: SolverOptions | None = None) -> None:
         self.model = model if isinstance(model, Model) else Model(model)
+        refuse_unilateral(self.model.system)
         self.options = options or SolverOptions()
         self._numbers = self.options.numbers()
         self._tables: Packed = self.model.tables
@@ -351,6 +343,10 @@ class Simulation(World):
         super().rewind(past)
         self._rows, self._settings = rows, settings
 
+    def record(self) -> np.ndarray:
+        """Steps so far: t, q, v, vdot, lam, mu, a row each."""
+        return np.concatenate([np.zeros((0, self._buffer.shape[1])), *self._rows])
+
     def trajectory(self) -> Trajectory:
         """Everything computed so far.
 
@@ -364,6 +360,13 @@ class Simulation(World):
             raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
         return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message)
+
+
+def new_simulation(model: Model | System, options: SolverOptions | None = None) -> Simulation | SlackSimulation:
+    """A simulation from the assembled start; one with ropes that may go slack cannot be steered on its way."""
+    if not unilateral_ropes(model if isinstance(model, System) else model.system):
+        return Simulation(model, options)
+    return SlackSimulation(Simulation, model, options)
 
 
 def simulate(
@@ -388,6 +391,6 @@ def simulate(
             f"solver option fixed_step: Expected at most t_end = {t_end} s, got {options.fixed_step} s: a run of one "
             "step, cut short, would say nothing about the step that was asked for."
         )
-    simulation = Simulation(model, options)
+    simulation = new_simulation(model, options)
     simulation.advance(t_end, progress)
     return simulation.trajectory()

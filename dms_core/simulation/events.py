@@ -33,6 +33,15 @@ class Crossing(NamedTuple):
     value: float = 0.0
 
 
+class Mark(NamedTuple):
+    """A place in time that a world can be put back to, with what it had recorded until then."""
+
+    time: float
+    snapshot: Any
+    rows: int
+    """Pieces of the record."""
+
+
 def checked(world: Any, stop_at: Crossing | Sequence[Crossing]) -> list[tuple[int, Crossing]]:
     """The crossings with the places of their components among the sensors.
 
@@ -66,22 +75,13 @@ def advance_to_crossing(
         # Sensors read accelerations and multipliers that belong to the inputs of now.
         world.settle()
         world.state.counts[COUNTS.restart] = 1
-    before = _readings(world, watched)
-    if world.crossing is not None and world.crossed_at == world.time:
-        # It stands where the last call ended, to rounding on either side.
-        before[[c == world.crossing for _, c in watched]] = 0.0
-    while world.time < t_end:
-        past = world.mark()
-        result = world.advance_once(t_end, progress)
-        if result is not Result.SUCCESS:
-            return result, None
-        now = _readings(world, watched)
-        passed = [k for k, (_, c) in enumerate(watched) if _passes(before[k], now[k], c.way)]
-        if passed:
-            return _land(world, past, [watched[k] for k in passed], before[passed], progress)
-        # Where it stands on the value, the side that it came from counts.
-        before = np.where(now == 0.0, before, now)
-    return Result.SUCCESS, None
+    # Where the last call ended on a crossing, it stands on the value to rounding, on either side.
+    standing = world.crossing is not None and world.crossed_at == world.time
+    ways = [crossing.way for _, crossing in watched]
+    on = [standing and crossing == world.crossing for _, crossing in watched]
+    result, which = advance_to_zero(world, t_end, lambda: _readings(world, watched), ways, on, progress)
+    world.crossed_at = world.time
+    return result, None if which is None else watched[which][1]
 
 
 def _readings(world: Any, watched: list[tuple[int, Crossing]]) -> np.ndarray:
@@ -90,38 +90,68 @@ def _readings(world: Any, watched: list[tuple[int, Crossing]]) -> np.ndarray:
     return np.array([y[k] - crossing.value for k, crossing in watched])
 
 
+def advance_to_zero(
+    world: Any,
+    t_end: float,
+    read: Callable[[], np.ndarray],
+    ways: Sequence[int],
+    on: Sequence[bool],
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Result, int | None]:
+    """Step until t_end or the first zero of any of some quantities; gives the result and which one ended it.
+
+    Args:
+        world: a World.
+        t_end: end [s].
+        read: the quantities at the present of the world, shape (n,).
+        ways: -1 for falling, 1 for rising, 0 for either, for each.
+        on: whether each stands on 0 now, and has to leave it first.
+        progress: called with the time reached.
+    """
+    before = np.where(on, 0.0, read())
+    while world.time < t_end:
+        past = world.mark()
+        result = world.advance_once(t_end, progress)
+        if result is not Result.SUCCESS:
+            return result, None
+        now = read()
+        passed = [k for k, way in enumerate(ways) if _passes(before[k], now[k], way)]
+        if passed:
+            return _land(world, past, read, passed, before, progress)
+        # Where it stands on the value, the side that it came from counts.
+        before = np.where(now == 0.0, before, now)
+    return Result.SUCCESS, None
+
+
 def _passes(before: float, now: float, way: int) -> bool:
-    """Whether a distance changes its sign that way; one that was 0 passes nothing."""
+    """Whether a quantity changes its sign that way; one that was 0 passes nothing."""
     return (way <= 0 and before > 0.0 >= now) or (way >= 0 and before < 0.0 <= now)
 
 
 def _land(
     world: Any,
     past: Any,
-    passed: list[tuple[int, Crossing]],
+    read: Callable[[], np.ndarray],
+    passed: list[int],
     before: np.ndarray,
     progress: Callable[[float], None] | None,
-) -> tuple[Result, Crossing | None]:
-    """End a step on the first of the crossings that lie within the last one."""
+) -> tuple[Result, int | None]:
+    """End a step on the first of the zeros that lie within the last one."""
     begin, end = past.time, world.time
     sharp = SHARPNESS * max(abs(end), end - begin)
 
     def at(t: float, k: int) -> float:
+        if t == begin:
+            return float(before[k])
         world.rewind(past)
-        if t > begin and world.advance(t) is not Result.SUCCESS:
-            return math.nan
-        return float(_readings(world, [passed[k]])[0])
+        return float(read()[k]) if world.advance(t) is Result.SUCCESS else math.nan
 
-    times = []
-    for k in range(len(passed)):
-        known = {begin: before[k]}
-        times.append(float(brentq(lambda t, k=k, known=known: known.get(t) or at(t, k), begin, end, xtol=sharp)))
+    times = [float(brentq(at, begin, end, args=(k,), xtol=sharp)) for k in passed]
     first = int(np.argmin(times))
     world.rewind(past)
     result = world.advance(max(times[first], begin + sharp), progress)
     world.state.counts[COUNTS.restart] = 1
-    world.crossed_at = world.time
-    return result, passed[first][1] if result is Result.SUCCESS else None
+    return result, passed[first] if result is Result.SUCCESS else None
 
 
 def advance_with_impacts(world: Any, t_end: float, contacts: dict[str, str]) -> Result:
