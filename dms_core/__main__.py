@@ -26,6 +26,7 @@ from dms_core.model_file import load
 from dms_core.results import Result, States
 from dms_core.schema import reference
 from dms_core.simulation.dynamics import new_simulation
+from dms_core.simulation.events import Crossing
 
 ROWS = 10_000
 """Rows of a table in memory at once."""
@@ -81,6 +82,7 @@ def run(
     sample: float | None = None,
     stats: FileOut | None = None,
     step: float | None = None,
+    stop_at: str | None = None,
     overwrite: bool = False,
 ) -> int:
     """Run a model file from its assembled start and write sensors, coordinates and rates as CSV.
@@ -99,12 +101,13 @@ def run(
         stats: JSON file for the solver's statistics.
         step: constant step [s], at most t_end, instead of error control; rtol then only sets how far Newton's method
             goes. Where t_end is no multiple of it, the last step is shorter, and the message says so.
+        stop_at: sensor component at whose first passing of 0 the run ends before, such as 'touch.gap'.
         overwrite: replace files of these names.
     """
     options = _options(t_end, sample, rtol, atol, step)
     files = [OutputFile("--out", out), *([] if stats is None else [OutputFile("--stats", stats)])]
     with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
-        trajectory = _simulated(compiled(model), options, t_end, sample)
+        trajectory = _simulated(compiled(model), options, t_end, sample, stop_at)
         if trajectory.result is Result.INTERRUPTED:
             write_csv(part := partial(out), lambda: table(trajectory, sample))
             raise Stopped(f"{trajectory.t[-1]:.4g} of {t_end:.4g} s are in '{outputs.where(part)}'.")
@@ -140,15 +143,18 @@ def _options(t_end: float, sample: float | None, rtol: float, atol: float | None
     return SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
 
 
-def _simulated(model: Model, options: SolverOptions, t_end: float, sample: float | None) -> Trajectory:
+def _simulated(
+    model: Model, options: SolverOptions, t_end: float, sample: float | None, stop_at: str | None
+) -> Trajectory:
     """A run whose table can be written, with a bar over simulated time."""
     check_columns(names := heads(model))
     for option, time in (("--sample", sample), ("--step", options.fixed_step)):
         if time is not None:
             check_size(option, t_end, time, len(names))
     simulation = new_simulation(model, options)
+    events = () if stop_at is None else [Crossing(stop_at, 0)]
     with bar_of_run(t_end) as bar:
-        simulation.advance(t_end, moves(bar))
+        simulation.advance(t_end, moves(bar), events)
     return simulation.trajectory()
 
 

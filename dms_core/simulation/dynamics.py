@@ -235,6 +235,8 @@ class World(Inspection):
     def message(self) -> str:
         """How the last call of `advance` ended, in sentences: where it went wrong, or which steps were shorter."""
         message, asked, shortest = self.result.value, self.options.fixed_step, self.stats().smallest_step
+        if self.result is Result.SUCCESS and self.crossing is not None:
+            message = f"The run ended where '{self.crossing.sensor}' passed {self.crossing.value:g}."
         if self.result is not Result.SUCCESS:
             return f"{message} Stopped at t = {self.time:.6g} s.{self._culprit()}"
         if asked and 0.0 < shortest < asked * (1.0 - WHOLE):

@@ -12,20 +12,20 @@ a run has the time of an event twice, with the values before and behind it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from dms_core.assembly.model import Model
-from dms_core.errors import ModelError, SimulationError
+from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.geometry.path import path_length, start_length
 from dms_core.model.ropes.pushing import NO_TENSION
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
-from dms_core.simulation.events import advance_to_zero
+from dms_core.simulation.events import Crossing, advance_to_zero
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.state import CLOCK
 
@@ -103,8 +103,18 @@ class SlackSimulation:
         self._message = ""
         self._signals: Any = self.model.new_signals()
 
-    def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
-        """Step until t_end [s] through all events; `progress` is called with the time reached now and then."""
+    def advance(
+        self, t_end: float, progress: Callable[[float], None] | None = None, stop_at: Sequence[Crossing] = ()
+    ) -> Result:
+        """Step until t_end [s] through all events; `progress` is called with the time reached now and then.
+
+        Raises:
+            InputError: an event of the user's own is asked for.
+        """
+        if stop_at:
+            raise InputError(
+                "stop_at: Expected no event in a run with ropes that may go slack, whose events end phases."
+            )
         for _ in range(MOST_EVENTS):
             if self.time >= t_end:
                 return self.result

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from dms_core.__main__ import main
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError
 from dms_core.model import Gravity, Input, Point, PointMass, SpringDamper, System
@@ -95,6 +96,24 @@ def test_a_jump_of_an_input_counts_where_the_sensor_stands_behind_it():
     world = World(model)
     world.advance(1.0, stop_at=Crossing("at.acceleration.x"))
     assert 0.5 <= world.time < 0.6
+
+
+def test_the_command_line_stops_at_a_touch_down(tmp_path, capsys):
+    """A ball that falls by 0.5 m: sqrt(2 h / g)."""
+    model, out = tmp_path / "ball.yaml", tmp_path / "ball.csv"
+    model.write_text(
+        "bodies: [{kind: point_mass, name: ball, mass: 1.0, position: [0.0, 0.5, 0.0]}]\n"
+        "forces:\n  - {kind: gravity, name: weight}\n"
+        "  - {kind: sphere_contact, name: touch, body_j: ball, stiffness: 1e6, restitution: 0.8}\n"
+        "sensors: [{kind: contact_sensor, name: sense, contact: touch}]\n"
+    )
+    command = ["run", str(model), "--t-end", "2", "--out", str(out)]
+    assert main([*command, "--stop-at", "sense.gap"]) == 0
+    assert "The run ended where 'sense.gap' passed 0." in capsys.readouterr().out
+    last = float(out.read_text().splitlines()[-1].split(",")[0])
+    assert last == pytest.approx(math.sqrt(2.0 * 0.5 / 9.80665), rel=1e-6)
+    assert main([*command, "--overwrite", "--stop-at", "sense.gep"]) == 2
+    assert "stop_at: sensor component 'sense.gep' does not exist" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 
 from dms_core.__main__ import main
 from dms_core.assembly.model import Model
-from dms_core.errors import ModelError
+from dms_core.errors import InputError, ModelError
 from dms_core.model import (
     Constant,
     Distance,
@@ -24,7 +24,8 @@ from dms_core.model import (
     Steps,
     System,
 )
-from dms_core.simulation.dynamics import SolverOptions, World, simulate
+from dms_core.simulation.dynamics import SolverOptions, World, new_simulation, simulate
+from dms_core.simulation.events import Crossing
 
 G, LENGTH = 9.81, 0.75
 WEIGHT = Gravity(name="weight", acceleration=(0.0, -G, 0.0))
@@ -164,6 +165,11 @@ def test_without_slackness_it_is_the_run_of_a_bilateral_rope():
 def test_a_world_that_is_advanced_by_hand_is_refused():
     with pytest.raises(ModelError, match="rope_length 'rope': unilateral = true: its phases are solved by `simulate`"):
         World(Model(swing((0.6, -0.45, 0.0))))
+
+
+def test_events_of_the_user_are_refused():
+    with pytest.raises(InputError, match="stop_at: Expected no event in a run with ropes that may go slack"):
+        new_simulation(swing((0.6, -0.45, 0.0))).advance(1.0, stop_at=[Crossing("cell.length")])
 
 
 def test_a_rope_that_is_slack_at_the_start_is_refused():
