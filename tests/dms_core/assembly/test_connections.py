@@ -81,7 +81,7 @@ def everything() -> System:
                 D=((0.01, 0.2, 0.1, 0.0), (0.0, 0.1, 0.0, 1.0)), start=(0.3,),
             ),
             DcMotor(name="motor", joint="hinge", voltage="volts", resistance=1.0, inductance=0.2, torque_constant=0.3),
-            SphereContact(name="touch", body_j="ball", radius=0.5, stiffness=90.0, restitution=0.6,
+            SphereContact(name="touch", body_j="ball", radius=0.5, stiffness=9.0, restitution=0.97,
                           impact_speed_input="speed"),
             SpherePairContact(
                 name="pair", body_i="arm", body_j="ball", radius_i=0.3, radius_j=0.3, stiffness=90.0, friction=0.2,
@@ -119,7 +119,7 @@ def _differences(f: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
 @pytest.fixture(scope="module")
 def world() -> World:
     world = World(Model(everything()))
-    world.advance(0.05)
+    world.advance(0.02)
     assert world.settle().name == "SUCCESS"
     return world
 
@@ -170,11 +170,44 @@ def test_the_newton_matrix_is_that_of_the_blocks(world):
     assert np.abs(again - x).max() < 1e-6
 
 
+@pytest.mark.parametrize(
+    ("element", "number"),
+    [("pid", "kp"), ("second", "filter_time"), ("block", "A.0.0"), ("block", "D.0.1"), ("motor", "gear_ratio"),
+     ("motor", "rotor_inertia"), ("touch", "radius"), ("pair", "friction"), ("roller", "radius"), ("hoist", "radius"),
+     ("tether", "free_length"), ("rope", "path.0.point.1"), ("arm", "mass")],
+)  # fmt: skip
+def test_derivatives_by_numbers_are_those_of_two_models(world, element, number):
+    """A number of a rope moves the controller that reads its tension only through the sensor, which the rope drives."""
+    at, system, h = world.operating_point(), world.model.system, 1e-5
+
+    def moved(value: Any, keys: list[str], change: float) -> Any:
+        if not keys:
+            return value + change
+        if isinstance(value, tuple):
+            return tuple(moved(x, keys[1:], change) if k == int(keys[0]) else x for k, x in enumerate(value))
+        return value.model_copy(update={keys[0]: moved(getattr(value, keys[0]), keys[1:], change)})
+
+    def rows(change: float) -> np.ndarray:
+        norms = sum(b.rigid for b in system.bodies)
+        lists = [system.bodies, system.constraints[norms:], system.forces, system.sensors, system.inputs]
+        lists = [[moved(e, number.split("."), change) if e.name == element else e for e in some] for some in lists]
+        names = ("bodies", "constraints", "forces", "sensors", "inputs")
+        other = World(Model(System("other", **dict(zip(names, lists, strict=True))), like=world.model))
+        return other.blocks(at).r2
+
+    numeric = (rows(h) - rows(-h)) / (2.0 * h)
+    found = world.parameter_blocks(element, number).r2
+    assert np.abs(found - numeric).max() < 1e-6 * max(1.0, np.abs(numeric).max())
+    assert np.abs(numeric).max() > 0.0
+
+
 def test_an_operating_point_holds_what_is_driven(world):
     at, layout = world.operating_point(), world.model.layout
     for name, coordinate in layout.driven.items():
         assert at.u[layout.input_index[name], 0] == at.v[layout.index[coordinate]]
     y = dict(zip([n for n, _ in layout.outputs], world.read(), strict=True))
+    # Both contacts press and both ropes pull: nothing above is a derivative of 0.
+    assert y["gap.normal"] > 0.1 and y["gap.gap"] < -0.1 and at.u[layout.input_index["speed"], 0] > 0.1
     assert at.v[layout.index["pid.reading"]] == pytest.approx(y["angle.angle"], abs=1e-9)
     assert at.v[layout.index["second.reading"]] == pytest.approx(y["cell"], rel=1e-9)
     assert at.v[layout.index["block.reading1"]] == pytest.approx(y["at.acceleration.y"], rel=1e-9)
