@@ -8,16 +8,26 @@ Base classes for elements of your own, and the contract of their kernels, are in
 from dms_core.model.bodies import PointMass, RigidBody
 from dms_core.model.constraints import (
     AngleDriver,
+    Belt,
+    Cylindrical,
     Distance,
+    DrumRope,
     EulerNorm,
     Fixed,
+    Gear,
+    JointTerm,
+    LinearCoupling,
     LineGuide,
+    Planar,
     PlaneGuide,
     PositionDriver,
+    Rack,
     Revolute,
     RopeLength,
+    Screw,
     Slider,
     Spherical,
+    Universal,
 )
 from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
 from dms_core.model.control import (
@@ -32,13 +42,19 @@ from dms_core.model.control import (
 from dms_core.model.electric import DcMotor
 from dms_core.model.element import GROUND
 from dms_core.model.forces import (
+    Bushing,
+    BushingCurves,
     FirstOrder,
     Gravity,
+    JointMotor,
     JointSpringDamper,
     JointStop,
+    LoadCurve,
     LumpedLoad,
     SecondOrder,
     SpringDamper,
+    TorsionSpring,
+    TurnCounter,
 )
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
 from dms_core.model.ropes import ElasticRope, PathPoint, RopeForce, Winch
@@ -53,6 +69,7 @@ from dms_core.model.sensors import (
     Tracking,
     WinchSensor,
 )
+from dms_core.model.sensors.force_load import ForceLoad
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
 from dms_core.model.signals import Constant, Function, Harmonic, Input, Lines, MinimumJerk, Spline, Steps
@@ -61,18 +78,25 @@ from dms_core.model.system import System
 __all__ = [
     "GROUND",
     "AngleDriver",
+    "Belt",
+    "Bushing",
+    "BushingCurves",
     "Constant",
     "ContactSensor",
     "CoordinateSensor",
     "CylinderContact",
+    "Cylindrical",
     "DcMotor",
     "DelayedError",
     "Distance",
+    "DrumRope",
     "ElasticRope",
     "EulerNorm",
     "FirstOrder",
     "Fixed",
+    "ForceLoad",
     "Function",
+    "Gear",
     "Gravity",
     "Harmonic",
     "ImpedanceController",
@@ -80,20 +104,26 @@ __all__ = [
     "Input",
     "JointAngle",
     "JointMoment",
+    "JointMotor",
     "JointReaction",
     "JointSpringDamper",
     "JointStop",
+    "JointTerm",
     "LineGuide",
+    "LinearCoupling",
     "Lines",
+    "LoadCurve",
     "LumpedLoad",
     "MinimumJerk",
     "MuscleSensor",
     "PathPoint",
     "Pid",
+    "Planar",
     "PlaneGuide",
     "Point",
     "PointMass",
     "PositionDriver",
+    "Rack",
     "ReferenceFilter",
     "Revolute",
     "RigidBody",
@@ -101,6 +131,7 @@ __all__ = [
     "RopeForce",
     "RopeLength",
     "RopeSensor",
+    "Screw",
     "SecondOrder",
     "SensorPid",
     "Slider",
@@ -114,7 +145,10 @@ __all__ = [
     "System",
     "ThelenCurves",
     "ThelenMuscle",
+    "TorsionSpring",
     "Tracking",
+    "TurnCounter",
+    "Universal",
     "Winch",
     "WinchSensor",
 ]

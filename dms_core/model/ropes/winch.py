@@ -21,7 +21,7 @@ from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.element import Coordinate, Force, Limit, Pattern, Placement
 from dms_core.model.geometry.angle import (
     add_angle_gradient,

@@ -123,7 +123,7 @@ def test_a_wrong_rope_is_refused(numbers, complaint):
 
 
 def test_a_sensor_says_what_has_a_tension():
-    with pytest.raises(ModelError, match="Expected a rope_force, elastic_rope or rope_length"):
+    with pytest.raises(ModelError, match="Expected a rope_force, elastic_rope, rope_length or drum_rope"):
         Model(
             System("x", bodies=[PointMass(name="m", mass=1.0)], forces=[Gravity(name="g")],
                    sensors=[RopeSensor(name="s", rope="g")])
