@@ -105,7 +105,7 @@ class DcMotor(Force):
     kind: ClassVar[str] = "dc_motor"
     kernel: ClassVar = dc_motor
     input_kernel: ClassVar = dc_motor_by_input
-    joint: str = Field(description="revolute joint that the motor turns")
+    joint: str = Field(description="joint with an angle, as a revolute, that the motor turns")
     voltage: str = Field(description="name of the input u(t) [V]")
     resistance: float = Field(gt=0.0, description="R [ohm]")
     inductance: float = Field(gt=0.0, description="L [H]")

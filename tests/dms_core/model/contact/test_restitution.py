@@ -224,6 +224,8 @@ def test_wrong_contacts_are_refused():
             SphereContact(name="touch", body_j="ball", stiffness=1.0, impact_speed_input="speed")]))  # fmt: skip
     with pytest.raises(ModelError, match="two points never touch"):
         SpherePairContact(name="touch", body_j="ball", radius_i=0.0, radius_j=0.0, stiffness=1.0)
-    with pytest.raises(ModelError, match="contact_sensor 's': 'weight' is a gravity. Expected the name of a Contact"):
+    with pytest.raises(
+        ModelError, match="contact_sensor 's': 'weight' is a gravity. Expected the name of a CylinderContact"
+    ):
         Model(System("x", bodies=[PointMass(name="ball", mass=1.0)], forces=[Gravity(name="weight")],
                      sensors=[ContactSensor(name="s", contact="weight")]))  # fmt: skip

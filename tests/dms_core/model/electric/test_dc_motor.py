@@ -179,7 +179,7 @@ def test_a_rope_that_is_all_off_its_drum_is_flagged():
         ({"torque_constant": 0.0}, "torque_constant = 0.0: Expected a number above 0"),
         ({"rotor_inertia": -1.0}, "rotor_inertia = -1.0: Expected a number of at least 0"),
         ({"voltage": "amps"}, "dc_motor 'motor': input 'amps' does not exist. Declared: volts"),
-        ({"joint": "hinge"}, "dc_motor 'motor': 'hinge' does not exist. Expected the name of a Revolute"),
+        ({"joint": "hinge"}, "dc_motor 'motor': 'hinge' does not exist. Expected the name of a"),
     ],
 )
 def test_a_wrong_motor_is_refused(numbers, complaint):
