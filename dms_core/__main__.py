@@ -21,7 +21,7 @@ from typing import Annotated, Any
 import numpy as np
 from tyro.conf import Positional, arg
 
-from dms_core import Model, Simulation, SolverOptions, Trajectory
+from dms_core import Model, SolverOptions, Trajectory
 from dms_core.analyses.commands.inverse import inverse
 from dms_core.analyses.commands.kinematic import kinematic
 from dms_core.analyses.commands.modes import modes
@@ -34,6 +34,8 @@ from dms_core.files.outputs import OutputFile, Outputs, partial
 from dms_core.model_tables import columns, compiled, heads
 from dms_core.results import Result
 from dms_core.schema import reference
+from dms_core.simulation.dynamics import new_simulation
+from dms_core.simulation.events import Crossing
 from dms_core.simulation.options import MethodName
 
 ROWS = 10_000
@@ -82,6 +84,7 @@ def run(
     stats: FileOut | None = None,
     step: float | None = None,
     method: MethodName = SolverOptions.method,
+    stop_at: str | None = None,
     overwrite: bool = False,
 ) -> int:
     """Run a model file from its assembled start and write sensors, coordinates and rates as CSV.
@@ -102,12 +105,13 @@ def run(
             goes. Where t_end is no multiple of it, the last step is shorter, and the message says so.
         method: method of integration: bdf2 (of order 2), sdirk2 (of order 2, for inputs that jump all the time), or
             radau5 (of order 5, for errors below about 1e-5 of the motion).
+        stop_at: sensor component at whose first passing of 0 the run ends before, such as 'touch.gap'.
         overwrite: replace files of these names.
     """
     options = _options(t_end, sample, rtol, atol, step, method)
     files = [OutputFile("--out", out), *([] if stats is None else [OutputFile("--stats", stats)])]
     with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
-        trajectory = _simulated(compiled(model), options, t_end, sample)
+        trajectory = _simulated(compiled(model), options, t_end, sample, stop_at)
         if trajectory.result is Result.INTERRUPTED:
             write_csv(part := partial(out), lambda: table(trajectory, sample))
             raise Stopped(f"{trajectory.t[-1]:.4g} of {t_end:.4g} s are in '{outputs.where(part)}'.")
@@ -145,15 +149,18 @@ def _options(
     return SolverOptions(rtol=rtol, atol=atol, fixed_step=step, method=method)
 
 
-def _simulated(model: Model, options: SolverOptions, t_end: float, sample: float | None) -> Trajectory:
+def _simulated(
+    model: Model, options: SolverOptions, t_end: float, sample: float | None, stop_at: str | None
+) -> Trajectory:
     """A run whose table can be written, with a bar over simulated time."""
     check_columns(names := heads(model))
     for option, time in (("--sample", sample), ("--step", options.fixed_step)):
         if time is not None:
             check_size(option, t_end, time, len(names))
-    simulation = Simulation(model, options)
+    simulation = new_simulation(model, options)
+    events = () if stop_at is None else [Crossing(stop_at, 0)]
     with bar_of_run(t_end) as bar:
-        simulation.advance(t_end, moves(bar))
+        simulation.advance(t_end, moves(bar), events)
     return simulation.trajectory()
 
 

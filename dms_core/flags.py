@@ -138,11 +138,15 @@ def _flag(
     return Flag(element.name, element.kind, said, limit.unit, first, total, float(x[worst]), float(t[worst]))
 
 
-def input_values(model: Model, signals: Signals, t: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """Values of all inputs at times t, shape (n, n_u); behind[k] takes the one behind a jump."""
+def input_values(model: Model, signals: Signals, t: np.ndarray, v: np.ndarray, behind: np.ndarray) -> np.ndarray:
+    """Values of all inputs at times t, shape (n, n_u); behind[k] takes the one behind a jump.
+
+    Those that an element drives are rates of its coordinates, in v, shape (n, n_q).
+    """
     work = model.new_work()
     table, packed, u = Packed(signals), Packed(work), np.zeros((len(t), len(model.layout.input_index)))
     for k in range(len(t)):
         evaluate_inputs(table.table, float(t[k]), not behind[k], packed.table)
         u[k] = work.u[:, 0]
+    model.layout.put_driven(u, v)
     return u

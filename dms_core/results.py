@@ -102,7 +102,7 @@ class Trajectory:
         limits, behind = Limits(self.model), _behind_jumps(self.t)
         lam = self.lam if limits.reads("multiplier") else self._lam
         reads = limits.reads("input")
-        u = input_values(self.model, self.signals, self.t, behind) if reads else np.zeros((0, 0))
+        u = input_values(self.model, self.signals, self.t, self.v, behind) if reads else np.zeros((0, 0))
         return limits.left(self.t, self.q, lam, u)
 
     @cached_property

@@ -112,7 +112,9 @@ class InputDerivatives:
         self._layout = layout
         self._sensing: Sensing = sensing.values
         self._kernels = derivative_addresses(layout.dynamics, "input_kernel", INPUT_DERIVATIVE)
-        reading = [e for e, c in enumerate(layout.dynamics) if len(c.iu)]
+        # By an input that an element drives every derivative is 0.
+        free = layout.input_index.keys() - layout.driven.keys()
+        reading = [e for e, c in enumerate(layout.dynamics) if free.intersection(c.placement.inputs)]
         self._dynamics = reading
         self._constraints = [e for e, c in enumerate(layout.constraints) if len(c.iu)]
         self.differenced = tuple(

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dms_core.assembly.connections import connected, driven_inputs
 from dms_core.errors import ModelError, choices
 from dms_core.model.element import GROUND, Constraint, Coordinate, DynamicElement, Placement, Sensor
 from dms_core.model.system import System
@@ -33,6 +34,8 @@ class Call:
     """First constraint row (constraints), first component of y (sensors)."""
     rows: int = 0
     """Number of constraint rows or of sensor components."""
+    sensor: Sensor | None = None
+    """Dynamic calls only: the sensor whose kernel this call is for, see connections.py."""
 
 
 class Layout:
@@ -60,6 +63,8 @@ class Layout:
             raise ModelError(f"system '{system.name}' has no coordinates: declare at least one body or equation.")
         self.index = {name: k for k, name in enumerate(self.names)}
         self.input_index = {u.name: k for k, u in enumerate(system.inputs)}
+        self.driven = driven_inputs(system, self.index)
+        """Coordinate whose rate is the input, for each input that an element drives."""
         self.dynamics = [self._call(e, p) for e in (*system.bodies, *system.forces) for p in _placed(e, system)]
         self.constraints: list[Call] = []
         self.row_names: list[str] = []
@@ -104,10 +109,18 @@ class Layout:
         twice = {b for b in placement.bodies if placement.bodies.count(b) > 1}
         if twice and not isinstance(element, Sensor):
             raise ModelError(f"{who}: Expected two different bodies, got '{twice.pop()}' twice.", element.name)
+        placement, sensor = self._connected(element, placement, who)
         iq = [self.body_indices(b) for b in placement.bodies]
         iq.append(np.array([self._index(element, "coordinate", c, self.index) for c in placement.coordinates], int))
         iu = np.array([self._index(element, "input", u, self.input_index) for u in placement.inputs], int)
-        return Call(element, placement, np.concatenate(iq).astype(np.int32), iu.astype(np.int32), row, rows)
+        return Call(element, placement, np.concatenate(iq).astype(np.int32), iu.astype(np.int32), row, rows, sensor)
+
+    def _connected(self, element, placement: Placement, who: str) -> tuple[Placement, Sensor | None]:
+        """The placement as it is where signals of the system are read."""
+        try:
+            return connected(self.system, element, placement, self.driven)
+        except ModelError as error:
+            raise ModelError(str(error) if who in str(error) else f"{who}: {error}", element.name) from None
 
     @staticmethod
     def _index(element, what: str, name: str, table: dict[str, int]) -> int:
@@ -120,6 +133,11 @@ class Layout:
         """Names of the inputs that no element reads."""
         read = {k for call in (*self.dynamics, *self.constraints, *self.sensors) for k in call.iu}
         return [name for name, k in self.input_index.items() if k not in read]
+
+    def put_driven(self, u: np.ndarray, v: np.ndarray) -> None:
+        """Values of driven inputs into u, shape (..., n_u), from rates v of the coordinates, shape (..., n_q)."""
+        for name, coordinate in self.driven.items():
+            u[..., self.input_index[name]] = v[..., self.index[coordinate]]
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
         """Declared q and v with the ground behind them, each of shape (n_q + 7,)."""

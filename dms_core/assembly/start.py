@@ -272,9 +272,10 @@ def _start_states(layout: Layout, signals: Signals, q: np.ndarray, v: np.ndarray
     packed = Packed(w)
     evaluate_inputs(Packed(signals).table, 0.0, False, packed.table)
     w.q[: layout.n_q], w.v[: layout.n_q] = q, v
+    first = {call.element.name: call for call in reversed(layout.dynamics)}
     for call in layout.dynamics:
         hook = getattr(call.element, "start_states", None)
-        if hook is None:
+        if hook is None or first[call.element.name] is not call:
             continue
         own = layout.offset[call.element.name]
         for k, (value, rate) in enumerate(hook(layout.system, w.q[call.iq], w.u[call.iu])):

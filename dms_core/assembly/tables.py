@@ -92,6 +92,8 @@ class Work(NamedTuple):
     Ya: np.ndarray
     Yl: np.ndarray
     Yu: np.ndarray
+    Ju: np.ndarray
+    """(n, 3 k), derivatives by inputs that elements drive; without any row where none are."""
 
 
 class Tables(NamedTuple):
@@ -210,4 +212,5 @@ def new_work(layout: Layout) -> Work:
         r_l=zeros(n), Jq=zeros((n, n)), Jv=zeros((n, n)), Ja=zeros((n, n)), phi_l=zeros(m), phi_t_l=zeros((m, 2)),
         G=zeros((m, n)), W=zeros((m, n)), H=zeros((n, n)), y_l=zeros(y), Yq=zeros((y, n)), Yv=zeros((y, n)),
         Ya=zeros((y, n)), Yl=zeros((y, m)), Yu=zeros((y, k)),
+        Ju=zeros((n if layout.driven else 0, 3 * k)),
     )  # fmt: skip

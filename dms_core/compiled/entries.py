@@ -17,6 +17,7 @@ from numba.extending import is_jitted
 
 from dms_core.assembly.layout import Call, Layout
 from dms_core.assembly.tables import CALLS, WORK, Calls, flat
+from dms_core.compiled import connected
 from dms_core.compiled.arena import fields, floats, indices, ints, matrix
 from dms_core.compiled.calls import ENTRY, address
 from dms_core.compiled.jit import compiled
@@ -99,16 +100,27 @@ _ENTRIES = {
     DYNAMIC: _dynamic, CONSTRAINT: _constraint, SENSOR: _sensor, INPUT_DERIVATIVE: _by_input,
     PARAMETER_DERIVATIVE: _by_parameter,
 }  # fmt: skip
+_WIRED = {
+    DYNAMIC: connected.wired_dynamic, SENSOR: connected.wired_sensor, INPUT_DERIVATIVE: connected.wired_by_input,
+    PARAMETER_DERIVATIVE: connected.wired_by_parameter,
+}  # fmt: skip
 
 
 @cache
-def entry(kernel: Any, signature: Any) -> Any:
+def entry(kernel: Any, signature: Any, form: Any = None, second: Any = None) -> Any:
     """The function (calls, e, w, level) that runs `kernel` on the local arrays of call e.
 
     It counts as a function of the kernel's file, where its machine code is kept if the kernel's is.
+
+    Args:
+        kernel: compiled function of the signature.
+        signature: DYNAMIC, CONSTRAINT, SENSOR, INPUT_DERIVATIVE or PARAMETER_DERIVATIVE.
+        form: what the entry does around it; default: the plain form of that signature.
+        second: what the form calls as `_second`.
     """
-    function, form = kernel.py_func, _ENTRIES[signature]
-    name, origin = f"{function.__name__}_entry", function.__code__
+    function = kernel.py_func
+    name, origin = f"{function.__name__}_{form.__name__ if form else 'entry'}", function.__code__
+    form = form or _ENTRIES[signature]
     code = form.__code__.replace(
         co_name=name, co_qualname=name, co_filename=origin.co_filename, co_firstlineno=origin.co_firstlineno
     )
@@ -117,7 +129,8 @@ def entry(kernel: Any, signature: Any) -> Any:
     habits: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
     habits["_nrt"] = options.get("_nrt", True)
     within = njit(function, locals=kernel.locals, **{**options, **habits, "forceinline": True})
-    known = {**form.__globals__, "_kernel": within}
+    known = {**form.__globals__, "_kernel": within, "_second": second}
+    known |= {"integers_of": integers_of, "numbers_of": numbers_of, "SLOPES": SLOPES}
     found = FunctionType(code, known, name)
     found.__module__, found.__qualname__ = function.__module__, name
     made = njit(found, **habits)
@@ -150,7 +163,10 @@ def derivative_addresses(calls: list[Call], attribute: str, signature: Any) -> n
                 f"{element.kind} '{element.name}': expected a function decorated with numba.njit as {attribute}, got "
                 f"{kernel!r}."
             )
-        found.append(0 if kernel is None else address(entry(kernel, signature), ENTRY))
+        # The kernel of a call that reads a sensor is the sensor's, and differences have to do.
+        known = kernel is not None and not call.placement.reads
+        form = _WIRED[signature] if call.placement.wired else None
+        found.append(address(entry(kernel, signature, form), ENTRY) if known else 0)
     return np.array(found, np.int64)
 
 
@@ -163,12 +179,12 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
     addresses = []
     for call in calls:
         element = call.element
-        kernel: Any = type(element).kernel
+        kernel: Any = type(call.sensor or element).kernel
         if kernel is not None and not is_jitted(kernel):
             raise ModelError(
                 f"{element.kind} '{element.name}': Expected a kernel decorated with numba.njit, got {kernel!r}."
             )
-        addresses.append(0 if kernel is None else address(entry(kernel, signature), ENTRY))
+        addresses.append(0 if kernel is None else address(_entry_of(call, kernel, signature), ENTRY))
     return Calls(
         np.array(addresses, np.int64),
         *flat([c.iq for c in calls], np.int32),
@@ -178,6 +194,28 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
         np.array([c.row for c in calls] + [sum(c.rows for c in calls)], np.int64),
         np.arange(len(calls)),
     )
+
+
+def _entry_of(call: Call, kernel: Any, signature: Any) -> Any:
+    """The entry of a call, which may read a sensor or driven inputs.
+
+    Raises:
+        ModelError: an element that reads a driven input cannot say how it depends on it.
+    """
+    if call.sensor is not None:
+        return entry(kernel, SENSOR, connected.reading)
+    if not call.placement.wired:
+        return entry(kernel, signature)
+    if signature is not DYNAMIC:
+        return entry(kernel, signature, _WIRED[signature])
+    second = derivative_kernel(type(call.element), "input_kernel")
+    if second is None:
+        raise ModelError(
+            f"{call.element.kind} '{call.element.name}' reads a driven input. Expected an input_kernel, which gives "
+            "its derivatives by it.",
+            call.element.name,
+        )
+    return entry(kernel, signature, connected.wired_dynamic, second)
 
 
 def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:

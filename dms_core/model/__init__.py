@@ -29,7 +29,17 @@ from dms_core.model.constraints import (
     Spherical,
     Universal,
 )
-from dms_core.model.control import DelayedError, ImpedanceController, Pid, ReferenceFilter, RopeActuator
+from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
+from dms_core.model.control import (
+    DelayedError,
+    ImpedanceController,
+    Pid,
+    ReferenceFilter,
+    RopeActuator,
+    SensorPid,
+    StateSpace,
+)
+from dms_core.model.electric import DcMotor
 from dms_core.model.element import GROUND
 from dms_core.model.flexible import (
     Beam,
@@ -62,8 +72,18 @@ from dms_core.model.forces import (
     TurnCounter,
 )
 from dms_core.model.muscles import ThelenCurves, ThelenMuscle
-from dms_core.model.ropes import PathPoint, RopeForce
-from dms_core.model.sensors import CoordinateSensor, Imu, JointAngle, MuscleSensor, Point, RopeSensor, Tracking
+from dms_core.model.ropes import ElasticRope, PathPoint, RopeForce, Winch
+from dms_core.model.sensors import (
+    ContactSensor,
+    CoordinateSensor,
+    Imu,
+    JointAngle,
+    MuscleSensor,
+    Point,
+    RopeSensor,
+    Tracking,
+    WinchSensor,
+)
 from dms_core.model.sensors.force_load import ForceLoad
 from dms_core.model.sensors.joint_moment import JointMoment
 from dms_core.model.sensors.reaction import JointReaction
@@ -91,12 +111,16 @@ __all__ = [
     "Bushing",
     "BushingCurves",
     "Constant",
+    "ContactSensor",
     "CoordinateSensor",
+    "CylinderContact",
     "Cylindrical",
+    "DcMotor",
     "DelayedError",
     "Distance",
     "DistributedLoad",
     "DrumRope",
+    "ElasticRope",
     "EulerNorm",
     "FirstOrder",
     "Fixed",
@@ -147,10 +171,14 @@ __all__ = [
     "Samples",
     "Screw",
     "SecondOrder",
+    "SensorPid",
     "Slider",
+    "SphereContact",
+    "SpherePairContact",
     "Spherical",
     "Spline",
     "SpringDamper",
+    "StateSpace",
     "Steps",
     "System",
     "Table",
@@ -160,6 +188,8 @@ __all__ = [
     "Tracking",
     "TurnCounter",
     "Universal",
+    "Winch",
+    "WinchSensor",
     "craig_bampton",
     "orthogonal",
 ]

@@ -41,6 +41,9 @@ element (input_derivatives.py, parameter_derivatives.py). Constraints need no su
 phi_t for given rates of its inputs tells the derivative by them. Derivatives of constraints and sensors by parameters
 are differences.
 
+An element may also read sensors, and drive inputs that others read: `Placement.reads`, `driven_inputs`. A force, a
+muscle, a motor or another controller need not know whether its input is a course in time or driven.
+
 An element whose own coordinates depend on the assembled position (a fibre in equilibrium, a controller's error) may
 have a method `start_states(system, q, u)` that gives one pair (value, rate) for each coordinate it owns, from the local
 coordinates q and inputs u (k, 3) of its first placement at the start.
@@ -171,6 +174,11 @@ class Placement:
     """Sensors only: the constraint whose multipliers are handed in as lam."""
     sources: tuple[str, ...] = field(default=())
     """Composed sensors only: elements whose own kernels are evaluated first."""
+    reads: str = ""
+    """Dynamic elements only: a sensor component by its full name. This is then no call of the element's kernel, but the
+    row v - y = 0 of its one coordinate, an own first-order one: its rate is the reading."""
+    wired: bool = False
+    """Set where an input that the call reads is driven by an element (dms_core.assembly.connections)."""
 
     @property
     def size(self) -> int:
@@ -208,6 +216,9 @@ class DynamicElement(Declaration):
         """Coordinates this element owns, by local name; the system prefixes '<element>.'."""
         return ()
 
+    reads_input_rates: ClassVar[bool] = False
+    """Whether the kernel reads rates of inputs, so that none of them can be driven by an element."""
+
     def input_names(self) -> tuple[str, ...]:
         """Names of the system inputs that the element reads."""
         return ()
@@ -219,6 +230,10 @@ class DynamicElement(Declaration):
         by these, [kg m] over their unit. Most elements have none.
         """
         return {}
+
+    def driven_inputs(self) -> tuple[tuple[str, str], ...]:
+        """(input, own coordinate) for each system input that the element drives: its value is the coordinate's rate."""
+        return ()
 
     def place(self, system) -> Placement:
         """Bodies, coordinates, inputs and tables of the one kernel call."""

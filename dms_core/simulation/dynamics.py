@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,12 +17,14 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
+from dms_core.simulation.events import Crossing, Mark, advance_to_crossing
 from dms_core.simulation.failure import explain, singular_joints
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.order_watch import LEFT_BEHIND, WEAK, ordered_for_another_size
 from dms_core.simulation.parts import SINGULAR_PIVOT, advance, restart
 from dms_core.simulation.rates_between import rates_between
+from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
 from dms_core.simulation.step_control import OUTCOME
@@ -40,6 +42,7 @@ MOST_RESCUES = 8
 
 RESULT_OF = {
     OUTCOME.done: Result.SUCCESS,
+    OUTCOME.buffer_full: Result.SUCCESS,
     OUTCOME.step_too_small: Result.STEP_TOO_SMALL,
     OUTCOME.newton_failed: Result.NEWTON_FAILED,
     OUTCOME.matrix_singular: Result.MATRIX_SINGULAR,
@@ -61,6 +64,7 @@ class World(Inspection):
 
     def __init__(self, model: Model | System, options: SolverOptions | None = None) -> None:
         self.model = model if isinstance(model, Model) else Model(model)
+        refuse_unilateral(self.model.system)
         self.options = options or SolverOptions()
         self._numbers = self.options.numbers()
         self._tables: Packed = self.model.tables
@@ -72,7 +76,12 @@ class World(Inspection):
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
+        self.crossing: Crossing | None = None
+        """What ended the last call of `advance`, where that was an event."""
+        self.crossed_at = -math.inf
+        """When that was [s]."""
         self._singular = self._why = ""
+        self._once = False
 
     @property
     def tables(self) -> Packed:
@@ -96,6 +105,9 @@ class World(Inspection):
             InputError: the value is not finite, or the input is declared as a course in time.
         """
         k = self.model.input_index(name)
+        if name in self.model.layout.driven:
+            by = self.model.layout.driven[name].rpartition(".")[0]
+            raise InputError(f"input '{name}' is driven by '{by}'; only an input that nothing drives can be set.")
         signal = self.model.system.inputs[k].signal
         if not isinstance(signal, Constant):
             raise InputError(
@@ -114,12 +126,27 @@ class World(Inspection):
         self.state.counts[COUNTS.restart] = 1
         return True
 
-    def advance(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
+    def advance(
+        self,
+        t_end: float,
+        progress: Callable[[float], None] | None = None,
+        stop_at: Crossing | Sequence[Crossing] = (),
+    ) -> Result:
         """Step until t_end [s]; `progress` is called with the time reached now and then.
+
+        Args:
+            t_end: end [s].
+            progress: called with the time reached.
+            stop_at: sensors whose passing of a value ends the call before t_end, see `Crossing`; `crossing` is then
+                the one that did. The last step lands on it.
 
         Returns:
             SUCCESS, or what stopped the run: what was computed is kept and finite.
         """
+        if stop_at:
+            self.result, self.crossing = advance_to_crossing(self, t_end, stop_at, progress)
+            return self.result
+        self.crossing = None
         if not (t_end == 0.0 or is_positive(t_end)) or t_end < self.time:
             raise InputError(f"t_end: Expected a time of at least the present {self.time:.6g} s, got {t_end} s.")
         try:
@@ -141,7 +168,25 @@ class World(Inspection):
             self._keep(self._buffer[:count])
             if progress is not None:
                 progress(self.time)
+            if self._once:
+                break
         return code
+
+    def advance_once(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
+        """One step towards t_end [s], or to it; as `advance` otherwise."""
+        whole, self._buffer, self._once = self._buffer, np.zeros((2, self._buffer.shape[1])), True
+        try:
+            return self.advance(t_end, progress)
+        finally:
+            self._buffer, self._once = whole, False
+
+    def mark(self) -> Mark:
+        """The present, to be put back to with `rewind`."""
+        return Mark(self.time, self.snapshot(), 0)
+
+    def rewind(self, past: Mark) -> None:
+        """Go back to a mark; what was recorded since is forgotten."""
+        self.restore(past.snapshot)
 
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""
@@ -245,6 +290,8 @@ class World(Inspection):
     def message(self) -> str:
         """How the last call of `advance` ended, in sentences: where it went wrong, or which steps were shorter."""
         message, asked, shortest = self.result.value, self.options.fixed_step, self.stats().smallest_step
+        if self.result is Result.SUCCESS and self.crossing is not None:
+            message = f"The run ended where '{self.crossing.sensor}' passed {self.crossing.value:g}."
         if self.result is not Result.SUCCESS:
             return f"{message} Stopped at t = {self.time:.6g} s.{self._why}"
         if asked and 0.0 < shortest < asked * (1.0 - WHOLE):
@@ -309,6 +356,20 @@ class Simulation(World):
         present = np.concatenate([[self.time], s.q, s.v, s.vd, s.lam, s.mu])
         self._rows = [present[None]] if not s.counts[COUNTS.restart] else []
 
+    def mark(self) -> Mark:
+        """The present, to be put back to with `rewind`."""
+        return super().mark()._replace(rows=len(self._rows))
+
+    def rewind(self, past: Mark) -> None:
+        """Go back to a mark; what was recorded since is forgotten, and what was recorded before is kept."""
+        rows, settings = self._rows[: past.rows], self._settings
+        super().rewind(past)
+        self._rows, self._settings = rows, settings
+
+    def record(self) -> np.ndarray:
+        """Steps so far: t, q, v, vdot, lam, mu, a row each."""
+        return np.concatenate([np.zeros((0, self._buffer.shape[1])), *self._rows])
+
     def trajectory(self) -> Trajectory:
         """Everything computed so far.
 
@@ -325,6 +386,13 @@ class Simulation(World):
         return Trajectory(
             self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message, rates
         )
+
+
+def new_simulation(model: Model | System, options: SolverOptions | None = None) -> Simulation | SlackSimulation:
+    """A simulation from the assembled start; one with ropes that may go slack cannot be steered on its way."""
+    if not unilateral_ropes(model if isinstance(model, System) else model.system):
+        return Simulation(model, options)
+    return SlackSimulation(Simulation, model, options)
 
 
 def simulate(
@@ -349,6 +417,6 @@ def simulate(
             f"solver option fixed_step: Expected at most t_end = {t_end} s, got {options.fixed_step} s: a run of one "
             "step, cut short, would say nothing about the step that was asked for."
         )
-    simulation = Simulation(model, options)
+    simulation = new_simulation(model, options)
     simulation.advance(t_end, progress)
     return simulation.trajectory()

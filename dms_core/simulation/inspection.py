@@ -65,6 +65,7 @@ class Inspection:
         s, t, model = self.state, np.array([self.time]), self.model
         evaluate_inputs(inner(self._world.table, STATE.signals), self.time, not behind, model.sensing.values.work.table)
         u = model.sensing.values.work.values.u.copy()
+        model.layout.put_driven(u[:, 0], s.v)
         lam = model.whole_multipliers(s.signals, t, s.q[None], s.v[None], s.vd[None], s.lam[None], np.array([behind]))
         return OperatingPoint(s.q.copy(), s.qd.copy(), s.v.copy(), s.vd.copy(), lam[0].copy(), s.mu.copy(), u)
 

@@ -9,10 +9,13 @@ from dms_core.model.control.delayed_error import DelayedError
 from dms_core.model.control.impedance import ImpedanceController
 from dms_core.model.control.pid import Pid
 from dms_core.model.control.reference_filter import ReferenceFilter
+from dms_core.model.control.sensor_pid import SensorPid
+from dms_core.model.control.state_space import StateSpace
 from dms_core.model.element import GROUND
 from dms_core.model.geometry.frames import quaternion
 from dms_core.model.geometry.path import PathPoint
 from dms_core.model.ropes.rope_force import RopeForce
+from dms_core.model.sensors.angle import JointAngle
 from dms_core.model.signals import Input
 from dms_core.model.system import System
 from tests.example_elements import Example
@@ -160,10 +163,71 @@ def actuator_rate() -> Example:
     return Example(system, motor, v={"soft.up_impulse": (-8.0, 8.0)})
 
 
+ANGLE = JointAngle(name="angle", joint="hinge")
+
+
+def _sensed(**changes) -> Example:
+    given = {"sensor": "angle.angle", "output": "pull", "kp": 4.0, "ki": 15.0, **changes}
+    pid = SensorPid(name="pid", **given)
+    return Example(controlled(pid, sensors=[ANGLE]), pid)
+
+
+def sensor_pid() -> Example:
+    """A set-point, no derivative, no limits."""
+    return _sensed(setpoint=0.4, offset=0.2)
+
+
+def sensor_pid_rate() -> Example:
+    """A reference, a derivative that is sensed, limits that are not reached."""
+    return _sensed(reference="psi", kd=3.0, rate="angle.rate", lowest=-900.0, highest=900.0, tracking_time=0.2)
+
+
+def sensor_pid_filtered() -> Example:
+    """A derivative behind a lag."""
+    return _sensed(reference="psi", kd=3.0, filter_time=0.1)
+
+
+def sensor_pid_limited() -> Example:
+    """Limits that are."""
+    return _sensed(reference="psi", kd=3.0, filter_time=0.1, highest=-90.0)
+
+
+def sensor_pid_tracking() -> Example:
+    """A derivative that is sensed and limits that are reached."""
+    return _sensed(reference="psi", kd=3.0, rate="angle.rate", lowest=90.0, tracking_time=0.2)
+
+
+def _block(**numbers) -> Example:
+    block = StateSpace(name="block", **numbers)
+    return Example(controlled(block, sensors=[ANGLE]), block)
+
+
+def state_space() -> Example:
+    """Everything."""
+    return _block(
+        sensors=("angle.angle", "angle.rate"), inputs=("psi", "wish"), outputs=("pull", "share", "authority"),
+        A=((-1.0, 2.0), (0.0, -3.0)), B=((1.0, 0.0, 2.0, -1.0), (0.5, 0.1, 0.0, 4.0)),
+        C=((1.0, 0.0), (0.3, 0.2), (0.0, -7.0)),
+        D=((0.0, 0.2, 0.0, 0.1), (1.0, 0.0, 0.4, 0.0), (0.0, 0.0, 0.0, 0.0)), start=(0.3, -0.2),
+    )  # fmt: skip
+
+
+def state_space_gain() -> Example:
+    """No states."""
+    return _block(inputs=("psi",), outputs=("pull",), D=((3.0,),))
+
+
+def state_space_alone() -> Example:
+    """No outputs."""
+    return _block(inputs=("psi",), A=((-2.0,),), B=((3.0,),))
+
+
 EXAMPLES = {
     "delayed_error": (delayed_chain, delayed_once),
     "impedance_controller": (impedance_fixed, impedance_following, impedance_without_leverage),
     "pid": (pid_plain, pid_filtered, pid_both),
     "reference_filter": (reference_filter,),
+    "sensor_pid": (sensor_pid, sensor_pid_rate, sensor_pid_filtered, sensor_pid_limited, sensor_pid_tracking),
+    "state_space": (state_space, state_space_gain, state_space_alone),
     "rope_actuator": (actuator_input, actuator_linear, actuator_blend, actuator_limit, actuator_rate),
 }

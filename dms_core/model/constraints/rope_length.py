@@ -1,7 +1,8 @@
 """Rope of fixed or prescribed length along a path (paper eq. 11): l(q) - psi = 0. One row.
 
 The force on the bodies is -lam l_q^T: lam is the tension [N]. The equation holds both ways, so a negative tension
-means that a real rope would be slack: the result of a run says when and how negative (`Trajectory.flags`).
+means that a real rope would be slack: the result of a run says when and how negative (`Trajectory.flags`). One that is
+declared unilateral goes slack instead, and is taken up with an impact (dms_core.simulation.slack).
 """
 
 from __future__ import annotations
@@ -49,6 +50,10 @@ class RopeLength(Constraint):
     )
     input: str | None = Field(default=None, description="name of the input that gives the length psi [m] instead")
 
+    unilateral: bool = Field(
+        default=False, description="the rope goes slack where its tension would be negative; it is taut at the start"
+    )
+
     @model_validator(mode="after")
     def _one_length(self):
         if self.length is not None and self.input is not None:
@@ -60,7 +65,9 @@ class RopeLength(Constraint):
         return ("length",)
 
     def limits(self) -> tuple[Limit, ...]:
-        """A rope cannot push."""
+        """A rope cannot push; a unilateral one does not."""
+        if self.unilateral:
+            return ()
         said = "its tension was negative, where a real rope would be slack"
         return no_push("multiplier", f"{self.name}.length", said)
 

@@ -5,6 +5,8 @@ from dms_core.model.control.delayed_error import DelayedError
 from dms_core.model.control.impedance import ImpedanceController
 from dms_core.model.control.pid import Pid
 from dms_core.model.control.reference_filter import ReferenceFilter
+from dms_core.model.control.sensor_pid import SensorPid
+from dms_core.model.control.state_space import StateSpace
 from dms_core.model.control.ziegler_nichols import CriticalGain, Gains, find_critical_gain, ziegler_nichols
 
 __all__ = [
@@ -15,6 +17,8 @@ __all__ = [
     "Pid",
     "ReferenceFilter",
     "RopeActuator",
+    "SensorPid",
+    "StateSpace",
     "find_critical_gain",
     "ziegler_nichols",
 ]

@@ -89,6 +89,7 @@ class Pid(Force):
     kind: ClassVar[str] = "pid"
     kernel: ClassVar = pid
     input_kernel: ClassVar = pid_by_input
+    reads_input_rates: ClassVar[bool] = True
     joint: str = Field(description="name of the revolute joint whose angle theta is controlled")
     reference: str | None = Field(default=None, description="name of the input psi(t) [rad]; None means 0")
     offset: str | None = Field(

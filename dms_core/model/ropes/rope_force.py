@@ -43,14 +43,11 @@ def rope_force(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         r[k] *= tau
 
 
-@compiled(makes_arrays=True)
+@compiled
 def rope_force_by_input(ip, par, q, v, a, u, Ju):
     """The rows of the bodies by the tension: l_q^T where the input pulls."""
     if u[0, 0] > 0.0:
-        gradient = np.zeros(ip[1])
-        add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, gradient)
-        for k in range(ip[1]):
-            Ju[k, 0, 0] = gradient[k]
+        add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, Ju[:, 0, 0])
 
 
 class RopeForce(Force):

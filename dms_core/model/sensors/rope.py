@@ -25,6 +25,7 @@ from dms_core.model.geometry.path import (
     path_rate,
     path_table,
 )
+from dms_core.model.ropes.elastic_rope import STRETCH, ElasticRope, elastic_tension
 from dms_core.model.ropes.rope_force import (
     CONSTANT,
     COORDINATE,
@@ -56,7 +57,20 @@ def rope_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
                 add_path_rate_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, v, 1.0, Yq[k])
                 add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, Yv[k])
         else:
-            _tension(k, ip, par, q, lam, u, level, y, Yq, Yl, Yu)
+            if ip[0] == STRETCH:
+                _elastic_tension(k, ip, par, q, v, level, y, Yq, Yv)
+            else:
+                _tension(k, ip, par, q, lam, u, level, y, Yq, Yl, Yu)
+
+
+@compiled
+def _elastic_tension(k, ip, par, q, v, level, y, Yq, Yv):
+    """Component k is the tension of a rope that stretches."""
+    y[k], by_length, by_rate = elastic_tension(ip, par, q, v)
+    if level > 0:
+        add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, by_length, Yq[k])
+        add_path_rate_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, v, by_rate, Yq[k])
+        add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, by_rate, Yv[k])
 
 
 @compiled
@@ -77,7 +91,7 @@ class RopeSensor(Sensor):
 
     kind: ClassVar[str] = "rope_sensor"
     kernel: ClassVar = rope_sensor
-    rope: str | None = Field(default=None, description="name of a rope_force, rope_length or drum_rope")
+    rope: str | None = Field(default=None, description="name of a rope_force, elastic_rope, rope_length or drum_rope")
     path: tuple[PathPoint, ...] | None = Field(default=None, min_length=2, description="points, instead of a rope")
     components: tuple[Literal["length", "rate", "tension"], ...] = Field(
         default=("length", "rate"), min_length=1, description="what is measured, in this order [m, m/s, N]"
@@ -106,13 +120,13 @@ class RopeSensor(Sensor):
         """The path's bodies, and whatever the tension comes from."""
         codes = (len(self.components), *(list(UNITS).index(c) for c in self.components))
         rope = None if self.rope is None else system.element(self.rope, Declaration)
-        if isinstance(rope, RopeForce):
+        if isinstance(rope, RopeForce | ElasticRope):
             placed = rope.place(system)
             return replace(placed, integers=(*placed.integers, *codes), pattern=None)
         if rope is not None and not isinstance(rope, RopeLength | DrumRope):
             raise ModelError(
-                f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}. Expected a rope_force, rope_length or "
-                "drum_rope."
+                f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}. Expected a rope_force, elastic_rope, "
+                "rope_length or drum_rope."
             )
         table = path_table(system, rope.path if rope is not None else self.path or ())
         return Placement(

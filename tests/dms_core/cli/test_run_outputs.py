@@ -27,7 +27,7 @@ RUN = ["run", str(PENDULUM), "--t-end", "0.1", "--sample", "0.05"]
 @pytest.fixture
 def never(monkeypatch):
     """Fails where a run begins."""
-    monkeypatch.setattr("dms_core.__main__.Simulation", lambda *given: pytest.fail("the run began"))
+    monkeypatch.setattr("dms_core.__main__.new_simulation", lambda *given: pytest.fail("the run began"))
 
 
 def test_the_same_command_twice_needs_the_flag(tmp_path, capsys):

@@ -33,7 +33,7 @@ from tests.dms_core.assembly.specimen import specimen
 METHODS = ("bdf2", "sdirk2", "radau5")
 LOCAL_WORK = {
     "q_l", "v_l", "a_l", "lam_l", "u_l", "r_l", "Jq", "Jv", "Ja", "phi_l", "phi_t_l", "G", "W", "H", "y_l", "Yq", "Yv",
-    "Ya", "Yl", "Yu",
+    "Ya", "Yl", "Yu", "Ju",
 }  # fmt: skip
 
 

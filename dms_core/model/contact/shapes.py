@@ -1,0 +1,132 @@
+"""Where two shapes touch: gap, normal and point of contact, and how they change with the coordinates.
+
+The first body carries a half-space or a sphere, the second one a sphere or a disc (one end of a cylinder):
+
+    plane, sphere    n = A_i m,        g = n . (c - P) - R,     X = c - (n . (c - P)) n
+    sphere, sphere   n = d / |d|,      g = |d| - R_i - R_j,     X = c_j - (R_j + g / 2) n,      d = c_j - c_i
+    plane, disc      Y = c - R t / sqrt(|t|^2 + e^2),   t = n - (n . f) f,   g = n . (Y - P),   X = Y - g n
+
+with the centre c, the disc's axis f = A_j b and its deepest point Y. A disc that lies flat in the plane has no deepest
+point: e = 1e-6 lets Y pass to its centre there. A point is a sphere without radius.
+
+A change is a derivative by one local coordinate, with the others held.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from dms_core.compiled.jit import compiled
+from dms_core.model.geometry.rotations import add, bilinear, dot, euler_parameters, point, rotated, scale, sub, vec
+
+PLANE_SPHERE, SPHERES, PLANE_DISC = 0, 1, 2
+"""First integer of a contact's table."""
+FLAT = 1e-6
+"""Sine of the angle between a disc and the plane from which on its deepest point passes to its centre [-]."""
+SHORTEST = 1e-9
+"""Distance of two centres below which there is no normal [m]."""
+BODY_I, BODY_J = 0, 7
+"""Offsets of both bodies."""
+
+
+class ContactNumbers(NamedTuple):
+    """Places of the kernel's numbers."""
+
+    s_i: int = 0
+    """Point of the plane, or centre of the first sphere, from the centre of mass of body i [m]."""
+    normal: int = 3
+    radius_i: int = 6
+    s_j: int = 7
+    """Centre of the sphere or disc from the centre of mass of body j [m]."""
+    axis: int = 10
+    radius: int = 13
+    stiffness: int = 14
+    damping: int = 15
+    """D [s/m]; with an impact speed from an input, d."""
+    friction: int = 16
+    slip_speed: int = 17
+
+
+CONTACT = ContactNumbers()
+
+
+@compiled
+def touch(shape, par, q):
+    """(g, n, X)."""
+    s_i, c = vec(par, CONTACT.s_i), point(q, BODY_J, vec(par, CONTACT.s_j))
+    P, R = point(q, BODY_I, s_i), par[CONTACT.radius]
+    if shape == SPHERES:
+        d = sub(c, P)
+        length = max(math.sqrt(dot(d, d)), SHORTEST)
+        n, g = scale(1.0 / length, d), length - par[CONTACT.radius_i] - R
+        return g, n, sub(c, scale(R + 0.5 * g, n))
+    n = rotated(q, BODY_I, vec(par, CONTACT.normal))
+    if shape == PLANE_DISC:
+        t = _across(n, rotated(q, BODY_J, vec(par, CONTACT.axis)))
+        Y = sub(c, scale(R / _size(t), t))
+        g = dot(n, sub(Y, P))
+        return g, n, sub(Y, scale(g, n))
+    h = dot(n, sub(c, P))
+    return h - R, n, sub(c, scale(h, n))
+
+
+@compiled
+def _across(n, f):
+    """The part of n across f."""
+    return sub(n, scale(dot(n, f), f))
+
+
+@compiled
+def _size(t):
+    """Regularised length of t."""
+    return math.sqrt(dot(t, t) + FLAT * FLAT)
+
+
+@compiled
+def unit_change(k, o):
+    """What coordinate k changes of the body at offset o by: (dr, dp), a triple and a 4-tuple."""
+    i = k - o
+    return (
+        (1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2)),
+        (1.0 * (i == 3), 1.0 * (i == 4), 1.0 * (i == 5), 1.0 * (i == 6)),
+    )
+
+
+@compiled
+def turned_by(q, o, dp, s):
+    """The change of A(p) s of the body at offset o."""
+    return scale(2.0, bilinear(euler_parameters(q, o), dp, s))
+
+
+@compiled
+def touch_change(shape, par, q, k):
+    """(dg, dn, dX) along coordinate k."""
+    dr_i, dp_i = unit_change(k, BODY_I)
+    dr_j, dp_j = unit_change(k, BODY_J)
+    s_i, s_j, R = vec(par, CONTACT.s_i), vec(par, CONTACT.s_j), par[CONTACT.radius]
+    P, c = point(q, BODY_I, s_i), point(q, BODY_J, s_j)
+    dP, dc = add(dr_i, turned_by(q, BODY_I, dp_i, s_i)), add(dr_j, turned_by(q, BODY_J, dp_j, s_j))
+    if shape == SPHERES:
+        d, dd = sub(c, P), sub(dc, dP)
+        length = max(math.sqrt(dot(d, d)), SHORTEST)
+        n = scale(1.0 / length, d)
+        dg = dot(n, dd)
+        dn = scale(1.0 / length, sub(dd, scale(dg, n)))
+        reach = R + 0.5 * (length - par[CONTACT.radius_i] - R)
+        return dg, dn, sub(dc, add(scale(0.5 * dg, n), scale(reach, dn)))
+    m = vec(par, CONTACT.normal)
+    n, dn = rotated(q, BODY_I, m), turned_by(q, BODY_I, dp_i, m)
+    if shape == PLANE_DISC:
+        b = vec(par, CONTACT.axis)
+        f, df = rotated(q, BODY_J, b), turned_by(q, BODY_J, dp_j, b)
+        t, along = _across(n, f), dot(n, f)
+        dt = sub(sub(dn, scale(dot(dn, f) + dot(n, df), f)), scale(along, df))
+        size = _size(t)
+        d_size = dot(t, dt) / size
+        Y = sub(c, scale(R / size, t))
+        dY = sub(dc, scale(R / size, sub(dt, scale(d_size / size, t))))
+        g, dg = dot(n, sub(Y, P)), dot(dn, sub(Y, P)) + dot(n, sub(dY, dP))
+        return dg, dn, sub(dY, add(scale(dg, n), scale(g, dn)))
+    h, dh = dot(n, sub(c, P)), dot(dn, sub(c, P)) + dot(n, sub(dc, dP))
+    return dh, dn, sub(dc, add(scale(dh, n), scale(h, dn)))

@@ -1,0 +1,85 @@
+"""Examples of contacts, so large that bodies in any position of the tests touch."""
+
+from __future__ import annotations
+
+from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
+from dms_core.model.element import Force
+from dms_core.model.sensors import ContactSensor
+from tests.example_elements import Example
+from tests.example_elements.pair import pair
+
+LAW = {"stiffness": 90.0, "restitution": 0.7, "impact_speed": 40.0, "friction": 0.4, "slip_speed": 0.5}
+BODIES = {"body_i": "upper", "body_j": "lower"}
+PLANE = {"point_i": (0.1, 9.0, -0.2), "normal_i": (0.3, 2.0, -0.5)}
+SPHERE = SphereContact(name="touch", centre_j=(0.1, 0.2, -0.3), radius=1.5, **PLANE, **BODIES, **LAW)
+INPUT = SphereContact(
+    name="touch", body_j="lower", centre_j=(0.1, 0.2, -0.3), radius=1.5, impact_speed_input="speed", **PLANE, **LAW
+)
+SPHERES = SpherePairContact(
+    name="touch", centre_i=(0.4, -0.1, 0.2), radius_i=3.0, centre_j=(-0.2, 0.5, 0.1), radius_j=2.0, **BODIES, **LAW
+)
+CYLINDER = CylinderContact(
+    name="touch", centre_j=(0.1, 0.2, -0.3), axis_j=(0.2, 0.4, 1.0), radius=0.8, length=0.6, **PLANE, **BODIES, **LAW
+)
+
+
+def _touch(element: Force, *inputs: str) -> Example:
+    return Example(pair(forces=[element], inputs=inputs), element, u={"speed": (20.0, 60.0)})
+
+
+def _sensed(element: Force, *inputs: str) -> Example:
+    sensor = ContactSensor(name="sense", contact="touch", end=1)
+    return Example(pair(forces=[element], sensors=[sensor], inputs=inputs), sensor, u={"speed": (20.0, 60.0)})
+
+
+def sphere() -> Example:
+    """Two moving bodies."""
+    return _touch(SPHERE)
+
+
+def sphere_on_ground() -> Example:
+    """On the ground, at an impact speed from an input."""
+    return _touch(INPUT, "speed")
+
+
+def spheres() -> Example:
+    """Two spheres."""
+    return _touch(SPHERES)
+
+
+def spheres_at_a_speed() -> Example:
+    """At an impact speed from an input."""
+    return _touch(SPHERES.model_copy(update={"impact_speed_input": "speed"}), "speed")
+
+
+def cylinder_at_a_speed() -> Example:
+    """At an impact speed from an input."""
+    return _touch(CYLINDER.model_copy(update={"impact_speed_input": "speed"}), "speed")
+
+
+def cylinder() -> Example:
+    """Both ends."""
+    return _touch(CYLINDER)
+
+
+def sensed_sphere() -> Example:
+    """Sensor of a sphere."""
+    return _sensed(SPHERE)
+
+
+def sensed_cylinder() -> Example:
+    """Sensor of one end."""
+    return _sensed(CYLINDER)
+
+
+def sensed_input() -> Example:
+    """Sensor of a contact that reads an input."""
+    return _sensed(INPUT, "speed")
+
+
+EXAMPLES = {
+    "sphere_contact": (sphere, sphere_on_ground),
+    "sphere_pair_contact": (spheres, spheres_at_a_speed),
+    "cylinder_contact": (cylinder, cylinder_at_a_speed),
+    "contact_sensor": (sensed_sphere, sensed_cylinder, sensed_input),
+}
