@@ -87,7 +87,7 @@ class KinematicResult:
     def flags(self) -> tuple[Flag, ...]:
         """Elements that left the range they are meant for, as a rope that pushes, see `Trajectory.flags`."""
         s = self.states
-        return Limits(s.model).left(s.t, s.q, s.lam, input_values(s.model, s.signals, s.t, s.behind))
+        return Limits(s.model).left(s.t, s.q, s.lam, input_values(s.model, s.signals, s.t, s.v, s.behind))
 
     def sensors(self) -> dict[str, np.ndarray]:
         """Every component of every sensor by name, shape (n,) each."""

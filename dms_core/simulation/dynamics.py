@@ -7,26 +7,24 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dms_core.assembly.linear_systems import TYPICAL_C0
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import with_settings
 from dms_core.compiled.arena import Packed, inner
-from dms_core.errors import InputError, ModelError, SimulationError
+from dms_core.errors import InputError, SimulationError
 from dms_core.flags import Flag, Limits
 from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.events import Crossing, Mark, advance_to_crossing
-from dms_core.simulation.failure import explain, singular_joints
-from dms_core.simulation.inspection import Inspection
+from dms_core.simulation.failure import explain
 from dms_core.simulation.options import SolverOptions, is_positive
-from dms_core.simulation.order_watch import LEFT_BEHIND, WEAK, ordered_for_another_size
-from dms_core.simulation.parts import SINGULAR_PIVOT, advance, restart
+from dms_core.simulation.parts import advance, restart
 from dms_core.simulation.rates_between import rates_between
+from dms_core.simulation.rescue import HELPED, Rescue
 from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
 from dms_core.simulation.snapshot import Snapshot
-from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state
 from dms_core.simulation.step_control import OUTCOME
 
 BUFFER_ROWS = 256
@@ -34,11 +32,6 @@ BUFFER_ROWS = 256
 
 WHOLE = 1e-6
 """Share of a step by which rounding may shorten the last one of many."""
-
-LOOK_AGAIN = 0.3
-"""Share of a pivot to which it may fall beside a singular position before that is looked at again."""
-MOST_RESCUES = 8
-"""Times in one call that an iteration which fails at every step size is given another order of elimination."""
 
 RESULT_OF = {
     OUTCOME.done: Result.SUCCESS,
@@ -50,11 +43,8 @@ RESULT_OF = {
     OUTCOME.rates_failed: Result.RATES_FAILED,
 }
 
-HELPED = (OUTCOME.matrix_singular, OUTCOME.rates_failed, OUTCOME.newton_failed, OUTCOME.step_too_small)
-"""Ways to stop that another order of elimination may help."""
 
-
-class World(Inspection):
+class World(Rescue):
     """One world that is advanced in time, with inputs set between calls; it remembers the present only.
 
     Args:
@@ -191,63 +181,6 @@ class World(Inspection):
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""
 
-    def _help(self, code: int, tried: set[tuple[int, float, int]]) -> bool:
-        """Do something about a matrix that is singular, or soon will be; False if nothing is left that was not tried.
-
-        Args:
-            code: of HELPED.
-            tried: where an order was chosen anew; written.
-        """
-        clock, asked = self.state.clock, code == OUTCOME.matrix_singular
-        c0 = float(clock[CLOCK.c0_factored]) or TYPICAL_C0
-        place = (code, self.time, round(math.log10(c0)))
-        usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
-        watched = usable and not ordered_for_another_size(self._tables.table, self._world.table)
-        if place in tried and watched:
-            clock[CLOCK.best_pivot] = 0.0
-            return True
-        if place in tried or (not asked and sum(p[0] == code for p in tried) >= MOST_RESCUES):
-            usual = (code, self.time, -1)
-            if not asked or usual in tried:
-                return asked and self._shorten()
-            tried.add(usual)
-            return self.reorder() or self._shorten()
-        tried.add(place)
-        weak = clock[CLOCK.pivot] < WEAK * clock[CLOCK.best_pivot]
-        clock[CLOCK.best_pivot] = 0.0
-        if watched and singular_joints(self.model, self.state.q, self.time)[0]:
-            # No choice of rows or pivots is a good one here, and one that is made here is none for later.
-            clock[CLOCK.best_pivot] = LOOK_AGAIN * clock[CLOCK.pivot] / WEAK
-            clock[CLOCK.singular_pivot] = LEFT_BEHIND * clock[CLOCK.pivot]
-            return True
-        if watched and not weak:
-            return True
-        if code == OUTCOME.rates_failed:
-            self.state.counts[COUNTS.restart] = 1
-        return self.reorder(c0 if asked or self.options.fixed_step else TYPICAL_C0) or usable
-
-    def reorder(self, c0: float = TYPICAL_C0) -> bool:
-        """Choose rows and pivots anew where the old ones are, or soon will be, singular; False if nothing helps.
-
-        The motion goes on as it was: the multipliers of the new rows exert the force of the old ones.
-
-        Args:
-            c0: leading coefficient of the step [1/s] that the order is for.
-        """
-        s, before = self.state, self._tables.values.active
-        try:
-            self._tables = self.model.reordered(s.q, s.v, self.time, s.signals, c0)
-        except ModelError as error:
-            self._singular = str(error)
-            return False
-        rows = self._tables.values.active
-        if not np.array_equal(rows, before):
-            kept = np.array([s.lam, s.lam_before, s.mu])
-            s.lam[:], s.lam_before[:], s.mu[:] = self.model.carried_over(s.q, kept, rows)
-        self._world = with_tables(self._tables.values, s)
-        self.state = self._world.values
-        return True
-
     def settle(self) -> Result:
         """Accelerations and multipliers of the present state under the present inputs, for reading before a step."""
         code = restart(self._tables.table, self._world.table, self._numbers)
@@ -279,12 +212,6 @@ class World(Inspection):
         s, at = self.state, self.operating_point()
         lam = self.model.unique_multipliers(s.q[None], at.lam[None])
         return Limits(self.model).left(np.array([self.time]), s.q[None], lam, at.u[None, :, 0])
-
-    def _shorten(self) -> bool:
-        """A quarter of the step for a matrix that is singular far from the present state; False below the smallest."""
-        clock = self.state.clock
-        clock[CLOCK.h_wanted] *= 0.25
-        return self.options.fixed_step is None and bool(clock[CLOCK.h_wanted] > self.options.h_min)
 
     @property
     def message(self) -> str:
