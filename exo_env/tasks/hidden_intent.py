@@ -27,7 +27,7 @@ from exo_env.tasks.elbow import (
 )
 from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
 from exo_env.tasks.electrodes import Electrodes, electrode_draws, put_envelopes
-from exo_env.tasks.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
+from exo_env.tasks.intent_rewards import INTENT_TERM, INTENT_WIDTH, IntentWeights, opposing_power, opposition
 from exo_env.tasks.intentions import Intentions
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.task import Reported, first_of, readings, step_of, terms_of
@@ -80,7 +80,7 @@ def read_intent(w):
 @compiled
 def judge_intent(w):
     """Check the limits, then fill the reward terms of intent_rewards.py."""
-    judge_elbow(w)
+    judge_elbow(w, INTENT_WIDTH)
     power = readings(w)[first_of(w)[INTENT.opposing_power]]
     terms_of(w)[INTENT_TERM.opposition] = opposition(power, floats(inner(w, WORLD.plan), PLAN.scale)[0])
 

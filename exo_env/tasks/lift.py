@@ -21,7 +21,7 @@ from exo_env.tasks.elbow import (
 from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
 from exo_env.tasks.movement import Movement
 from exo_env.tasks.repetition import Repetitions
-from exo_env.tasks.rewards import Weights
+from exo_env.tasks.rewards import TRACKING_WIDTH, Weights
 from exo_env.tasks.task import Reported, first_of
 
 
@@ -42,6 +42,12 @@ def _read(w):
     put_preview(w, first_of(w)[LIFT.preview])
 
 
+@compiled
+def _judge(w):
+    """Check the limits, and fill the reward terms of rewards.py."""
+    judge_elbow(w, TRACKING_WIDTH)
+
+
 class LiftTask(ElbowTask):
     """The task: follow the reference, and let the patient do what the patient can."""
 
@@ -53,7 +59,7 @@ class LiftTask(ElbowTask):
         Reported("effort", "effort"),
         Reported("elbow_reaction", "reaction"),
     )
-    read, judge = _read, judge_elbow
+    read, judge = _read, _judge
 
     def declared_readings(self, parts: Parts) -> list[Reading]:
         """The readings of `lift_readings`."""
