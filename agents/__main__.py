@@ -25,19 +25,19 @@ import sys
 
 from dms_core.command_line import run_command
 
-from .commands.ablations import ablations
-from .commands.adaptation import adaptation
 from .commands.evaluate import evaluate, policies
-from .commands.export import export
-from .commands.hindsight import hindsight
-from .commands.picture import picture
-from .commands.report import report
-from .commands.shift import shift
-from .commands.sweep import sweep
-from .commands.train import train
-from .commands.tune_baselines import tune_baselines
-from .commands.upper_bound import upper_bound
-from .commands.video import video
+from .commands.pictures.picture import picture
+from .commands.pictures.report import report
+from .commands.pictures.video import video
+from .commands.search.hindsight import hindsight
+from .commands.search.tune_baselines import tune_baselines
+from .commands.search.upper_bound import upper_bound
+from .commands.studies.ablations import ablations
+from .commands.studies.adaptation import adaptation
+from .commands.studies.shift import shift
+from .commands.training.export import export
+from .commands.training.sweep import sweep
+from .commands.training.train import train
 from .environment import PROGRAM
 
 

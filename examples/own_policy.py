@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from agents.evaluation.evaluate import evaluate
+from agents.evaluation.comparison.evaluate import evaluate
 from agents.policies import POLICIES, Policy
 
 

@@ -9,8 +9,8 @@ from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.kernels import compiled, first_of, readings, terms_of
 from exo_env.tasks.elbow import ELBOW
+from exo_env.tasks.judgement.rewards import TERM, Weights
 from exo_env.tasks.lift import LiftTask
-from exo_env.tasks.rewards import TERM, Weights
 
 gentle = ElbowLiftEnv(reward_weights={"reaction": 2.0, "smoothness": 0.0})
 print("weights:", gentle.weights.model_dump())

@@ -10,9 +10,9 @@ from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.vector_env import AssistanceVectorEnv
 from exo_env.kernels import compiled, first_of, places, readings, terms_of
 from exo_env.settings import Settings
-from exo_env.tasks.channels import Parts
 from exo_env.tasks.elbow import ELBOW, action_channel, device_channels, elbow_readings, read_elbow
-from exo_env.tasks.movement import Stay
+from exo_env.tasks.movements.movement import Stay
+from exo_env.tasks.observation.channels import Parts
 from exo_env.tasks.task import Reported, Task
 
 TARGET = math.radians(60.0)

@@ -3,11 +3,11 @@
 Importing it registers the environments with Gymnasium and loads nothing else; take what you need from the folders:
 
     envs        the environments, one file an id; many worlds in one compiled batch; Stable-Baselines3
-    tasks       what is observed, rewarded and ended, and along which movement
+    tasks       one file a task, on what its folders hold: observation, movements, judgement (rewards and limits)
     drives      what an action does to the device
-    patient     who is assisted, populations, and how a command becomes excitations
+    patient     who is assisted, populations, and in its folder excitation how an intention becomes excitations
     ecosystem   the three subsystems of Fig. 8, from configs/, joined into one dms_core System
-    world       the arrays of one world, a control period, a reset
+    world       the arrays of one world; its folders hold compiled functions (kernels) and episodes
     rendering   pictures of an episode
     paper       the paper's use cases and its controller tuning
 """

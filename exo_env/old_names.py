@@ -1,4 +1,4 @@
-"""Modules by the names that they had in version 0.1.0, and where they are now."""
+"""Modules by the names that they had up to version 0.3.0, and where they are now."""
 
 MOVED = {
     "actions": "drives.drive",
@@ -6,51 +6,80 @@ MOVED = {
     "batch": "world.batch",
     "canvas": "rendering.canvas",
     "claims": "world.work_sharing",
-    "command_kernel": "patient.static_optimisation",
-    "control_period": "world.control_period",
+    "command_kernel": "patient.excitation.static_optimisation",
+    "control_period": "world.kernels.control_period",
     "distributions": "patient.distributions",
-    "effort": "patient.effort",
-    "episode": "world.episode",
-    "events": "tasks.limits",
+    "effort": "patient.excitation.effort",
+    "episode": "world.episodes.episode",
+    "events": "tasks.judgement.limits",
     "exoskeleton": "ecosystem.exoskeleton",
-    "fatigue": "patient.fatigue",
+    "fatigue": "patient.excitation.fatigue",
     "figures": "paper.figures",
-    "fitting": "world.scaling",
+    "fitting": "world.kernels.scaling",
     "gym_machine": "ecosystem.gym_machine",
     "human": "ecosystem.arm",
     "jit": "kernels",
     "lift_env": "envs.elbow_lift",
     "lift_settings": "envs.settings",
     "measures": "paper.summary",
-    "motor_command": "patient.motor_command",
+    "motor_command": "patient.excitation.motor_command",
     "need": "patient.ability",
-    "observations": "tasks.observer",
-    "opening": "world.reset",
+    "observations": "tasks.observation.observer",
+    "opening": "world.kernels.reset",
     "orderings": "paper.statements",
     "panels": "rendering.panels",
     "picture": "rendering.picture",
     "plant": "tables",
     "population": "patient.population",
-    "readout": "world.readout",
-    "repetition": "tasks.movement",
-    "rewards": "tasks.rewards",
+    "readout": "world.episodes.readout",
+    "repetition": "tasks.movements.movement",
+    "rewards": "tasks.judgement.rewards",
     "rig": "world.world",
     "sb3": "envs.elbow_lift_sb3",
     "scenarios": "paper.scenarios",
     "scene": "rendering.scene",
     "shapes": "rendering.shapes",
-    "slacking": "patient.slacking",
+    "slacking": "patient.excitation.slacking",
     "soak": "envs.soak",
     "staging": "rendering.episode_scene",
-    "start_kernel": "world.rest_pose",
+    "start_kernel": "world.kernels.rest_pose",
     "tune": "paper.tuning",
     "vector_env": "envs.vector_env",
+    "patient.effort": "patient.excitation.effort",
+    "patient.fatigue": "patient.excitation.fatigue",
+    "patient.forward_model": "patient.excitation.forward_model",
+    "patient.motor_command": "patient.excitation.motor_command",
+    "patient.slacking": "patient.excitation.slacking",
+    "patient.static_optimisation": "patient.excitation.static_optimisation",
+    "patient.stretch_reflex": "patient.excitation.stretch_reflex",
+    "tasks.channels": "tasks.observation.channels",
+    "tasks.course": "tasks.movements.course",
+    "tasks.electrodes": "tasks.observation.electrodes",
+    "tasks.intended_plan": "tasks.movements.intended_plan",
+    "tasks.intent_rewards": "tasks.judgement.intent_rewards",
+    "tasks.intentions": "tasks.movements.intentions",
+    "tasks.limits": "tasks.judgement.limits",
+    "tasks.movement": "tasks.movements.movement",
+    "tasks.noise": "tasks.observation.noise",
+    "tasks.observer": "tasks.observation.observer",
+    "tasks.repetition": "tasks.movements.repetition",
+    "tasks.rewards": "tasks.judgement.rewards",
+    "tasks.submovements": "tasks.movements.submovements",
+    "world.control_period": "world.kernels.control_period",
+    "world.episode": "world.episodes.episode",
+    "world.episode_code": "world.kernels.episode_code",
+    "world.held_episode": "world.episodes.held_episode",
+    "world.load_step": "world.kernels.load_step",
+    "world.readout": "world.episodes.readout",
+    "world.reset": "world.kernels.reset",
+    "world.rest_pose": "world.kernels.rest_pose",
+    "world.scaling": "world.kernels.scaling",
 }
 
 _KERNEL = "Compiled code is written with exo_env.kernels now: tables in small tuples by owner (exo_env/tables.py)."
 _MUSCLES = "Muscles come from the arm: exo_env.ecosystem.arm.Arm().muscles, .signs."
 _ROPES = "Ropes come from the device: Exoskeleton.ropes, .lifting_rope, .lowering_rope."
-_READINGS = "Readings and channels are declared by a task: exo_env.tasks.channels, exo_env.tasks.lift."
+_READINGS = "Readings and channels are declared by a task: exo_env.tasks.observation.channels, exo_env.tasks.lift."
 
 NAMES = {
     "actions": {
@@ -98,8 +127,8 @@ NAMES = {
         "RopeName": _ROPES,
     },
     "fitting": {
-        "Fitting": "world.scaling:Scaling",
-        "fitting": "It is scaling_of(ecosystem, drive) now, in exo_env.world.scaling.",
+        "Fitting": "world.kernels.scaling:Scaling",
+        "fitting": "It is scaling_of(ecosystem, drive) now, in exo_env.world.kernels.scaling.",
     },
     "human": {
         "MUSCLES": _MUSCLES,
@@ -110,8 +139,8 @@ NAMES = {
     },
     "lift_settings": {"TIME": "envs.elbow_lift:TIME"},
     "observations": {
-        **{name: f"tasks.channels:{name}" for name in ("Channel", "Imperfection", "Slice")},
-        "imperfect": "tasks.noise:imperfect",
+        **{name: f"tasks.observation.channels:{name}" for name in ("Channel", "Imperfection", "Slice")},
+        "imperfect": "tasks.observation.noise:imperfect",
         "GROUPS": _READINGS,
         "TRUTH": _READINGS,
         "TRUTH_SIZE": _READINGS,
@@ -119,7 +148,7 @@ NAMES = {
     },
     "opening": {"SETTING": _KERNEL, "Setting": _KERNEL, "open_episode": "It is begin_episode now."},
     "repetition": {
-        name: f"tasks.repetition:{name}"
+        name: f"tasks.movements.repetition:{name}"
         for name in (
             "Repetition",
             "Repetitions",
@@ -131,7 +160,7 @@ NAMES = {
             "put_pieces",
         )
     },
-    "rewards": {"TERMS": "Terms are the fields of Weights: exo_env.tasks.rewards.TERM._fields."},
+    "rewards": {"TERMS": "Terms are the fields of Weights: exo_env.tasks.judgement.rewards.TERM._fields."},
     "rig": {"Rig": "world.world:PatientWorld"},
     "staging": {"staged": "rendering.episode_scene:scene_of"},
     "start_kernel": {"put_start": "It is put_rest now.", "handle_angle": "ecosystem.gym_machine:handle_angle"},

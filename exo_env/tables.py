@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from dms_core.kernels import Packed, fields
 from exo_env.clearing import Cleared, Filled, Kept
-from exo_env.patient.effort import EffortState
+from exo_env.patient.excitation.effort import EffortState
 from exo_env.places import places
 
 STATUS = places(("step", "code", "event"))
@@ -76,7 +76,7 @@ class DriveTables(NamedTuple):
 
 
 class PatientTables(NamedTuple):
-    """The patient in the device, who acts at ticks of its own clock (patient/effort.py); m muscles, k ticks."""
+    """The patient in the device, acting at ticks of a clock of its own (excitation/effort.py); m muscles, k ticks."""
 
     traits: Cleared
     """Numbers of the patient, at the places of PATIENT."""
@@ -161,7 +161,7 @@ class ObserverTables(NamedTuple):
     columns: Kept
     """Place of each component in the readings, shape (n,)."""
     imperfections: Kept
-    """Imperfections of each component, shape (n, 7); see tasks/noise.py."""
+    """Imperfections of each component, shape (n, 7); see tasks/observation/noise.py."""
     streams: Kept
     """Random stream of each component's noise, as a signed number, shape (n,)."""
     tremor: Cleared

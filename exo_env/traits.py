@@ -6,10 +6,10 @@ Everything else follows: the patient's row of numbers, the ranges that populatio
 privileged observer is shown, and how the numbers of a world are scaled. `acts` says which part of the simulation reads
 the number:
 
-    size      body and muscles: the numbers of the world are scaled with it (world/scaling.py)
+    size      body and muscles: the numbers of the world are scaled with it (world/kernels/scaling.py)
     muscle    time constants of the muscles
-    effort    from the command to the excitations, at every tick of the patient (patient/effort.py)
-    plan      what the patient expects when the command is planned (patient/motor_command.py)
+    effort    from the command to the excitations, at every tick of the patient (patient/excitation/effort.py)
+    plan      what the patient expects when the command is planned (patient/excitation/motor_command.py)
     joint     a number of a joint's own element, in which the numbers of the world are linear (ecosystem/arm.py)
 """
 

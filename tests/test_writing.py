@@ -25,15 +25,15 @@ ALLOWED = {
     # Folders that appear whole: their files are written in the one way, then the folder takes its name.
     "agents/checkpoint.py": {"mkdir", "rename", "shutil.rmtree"},
     # Its own file, whose tries stand in another one by then.
-    "agents/evaluation/tries.py": {"unlink"},
+    "agents/evaluation/search/tries.py": {"unlink"},
     # Its own file, to which lines are added; one that is not whole is dropped.
-    "agents/evaluation/kept_shares.py": {"open", "unlink"},
+    "agents/evaluation/sharing/kept_shares.py": {"open", "unlink"},
     # The lock of a folder, which must stay the same file.
-    "agents/training/run_folder.py": {"open"},
+    "agents/training/files/run_folder.py": {"open"},
     # Into a file in memory, from an archive, and into a folder of its own for another program.
-    "agents/training/model_state.py": {"np.savez", "zipfile.ZipFile"},
+    "agents/training/files/model_state.py": {"np.savez", "zipfile.ZipFile"},
     "exo_env/rendering/panels.py": {"savefig"},
-    "agents/commands/video.py": {"imageio.get_writer", "tempfile.TemporaryDirectory"},
+    "agents/commands/pictures/video.py": {"imageio.get_writer", "tempfile.TemporaryDirectory"},
 }
 """What each file may do itself, and why."""
 WRITING = {

@@ -17,10 +17,10 @@ from dms_core.files.outputs import Outputs, partial
 from exo_env.rendering.panels import require_matplotlib
 
 from ..environment import ENVIRONMENT, environment_id
-from ..evaluation.evaluate import Plan, each_episode_of, results_of
-from ..evaluation.figure import draw
-from ..evaluation.opponents import with_opponents
-from ..evaluation.tables import gap_lines, heading, left_out_lines, short_table, statistic, whole_table
+from ..evaluation.comparison.evaluate import Plan, each_episode_of, results_of
+from ..evaluation.comparison.opponents import with_opponents
+from ..evaluation.figures.figure import draw
+from ..evaluation.results.tables import gap_lines, heading, left_out_lines, short_table, statistic, whole_table
 from ..policies.baselines import FOLLOWING, POLICIES
 from ..policies.learned import find_policy, shipped_policies
 from ..policies.policy import Policy

@@ -13,7 +13,7 @@ from dms_core.files.json_text import brief, parse_json
 from ..checkpoint import Store
 from ..distributed.cluster import connected
 from ..environment import hides_plan
-from ..evaluation.shares import ShareOut, processes
+from ..evaluation.sharing.shares import ShareOut, processes
 from ..policies.learned import (
     DESCRIPTION,
     SHIPPED,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..evaluation.evaluate import Plan, episodes_of, results_of
+from ..evaluation.comparison.evaluate import Plan, episodes_of, results_of
 from ..policies.policy import Policy
 from .cluster import share_out
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from dms_core.errors import InputError
 
-from ..training.config import Config
-from ..training.config_file import TRAINING
-from ..training.records import RECORD, read_curve
-from ..training.run_folder import RunFolder
+from ..training.files.records import RECORD, read_curve
+from ..training.files.run_folder import RunFolder
+from ..training.settings.config import Config
+from ..training.settings.config_file import TRAINING
 from ..training.usable import checked_config
 from .variations import Variation, folder_of
 
@@ -81,7 +81,7 @@ def _named_in(content: dict[str, Any]) -> set[str]:
 
 def train_share(content: dict[str, Any], seed: int, folder: str) -> dict[str, Any]:
     """One training, from its start or from its last checkpoint; returns its best evaluation."""
-    from ..evaluation.episode import judged
+    from ..evaluation.episodes.episode import judged
     from ..training.run import TrainingRun
 
     place = RunFolder(Path(folder))

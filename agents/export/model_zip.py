@@ -44,8 +44,8 @@ def from_zip(
     if action_mode is None:
         raise InputError(f"'{source}' does not say what its actions do. Give the --action-mode that it was trained in.")
     require_training()
-    from ..training.algorithms import find
-    from ..training.extraction import Origin, extract
+    from ..training.learners.algorithms import find
+    from ..training.networks.extraction import Origin, extract
 
     model, env = _read(find(algorithm), source), make(environment, action_mode=action_mode)
     try:

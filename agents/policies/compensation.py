@@ -24,7 +24,7 @@ import numpy as np
 
 from exo_env.ecosystem.arm import Person
 from exo_env.ecosystem.ecosystem import Ecosystem
-from exo_env.patient.motor_command import InternalModel
+from exo_env.patient.excitation.motor_command import InternalModel
 
 from .lagging_pid import LaggingPid
 from .policy import Channels, Policy

@@ -16,14 +16,14 @@ from dms_core.files.output_file import write_json, write_text
 
 from ..environment import make, patient_seeds
 from ..policies.learned import LearnedPolicy
-from .config import Config
-from .model_state import save_model
-from .records import EVALUATIONS, STATE, read_point
-from .run_folder import RunFolder
+from .files.model_state import save_model
+from .files.records import EVALUATIONS, STATE, read_point
+from .files.run_folder import RunFolder
+from .settings.config import Config
 
 Judge = Callable[[gymnasium.Env, LearnedPolicy, Sequence[int]], list[dict[str, Any]]]
 """Measures of a policy's episode with each seed, by name; "return" is one of them. What is measured is not decided
-here: who starts a training gives it (evaluation/episode.py)."""
+here: who starts a training gives it (evaluation/episodes/episode.py)."""
 
 
 class LearningCurve:

@@ -20,14 +20,14 @@ from dms_core.files.output_file import write_text
 from dms_core.files.output_place import cannot
 
 from ..policies.learned import LearnedPolicy
-from .algorithms import build
-from .config import Config
-from .extraction import Origin, extract
-from .initial import begin_with, hold_actor
+from .files.model_state import load_state, save_state
+from .files.records import STATE, read_state
+from .files.run_folder import RunFolder
+from .learners.algorithms import build
 from .learning_curve import Judge, LearningCurve, checkpoint_name
-from .model_state import load_state, save_state
-from .records import STATE, read_state
-from .run_folder import RunFolder
+from .networks.extraction import Origin, extract
+from .networks.initial import begin_with, hold_actor
+from .settings.config import Config
 from .worlds import wrapped
 
 Report = Callable[[int, dict[str, Any] | None], None]

@@ -7,7 +7,7 @@ from pathlib import Path
 from dms_core.errors import DmsError, InputError, extra
 
 from ..environment import check_settings
-from .config import Config
+from .settings.config import Config
 
 
 def require_training() -> None:
@@ -35,7 +35,7 @@ def checked_config(path: Path, changes: tuple[str, ...], environment: str | None
     Raises:
         InputError: names file, key and value.
     """
-    from .algorithms import arguments
+    from .learners.algorithms import arguments
 
     config = Config.read(path, changes, environment)
     try:
@@ -69,7 +69,7 @@ def check_other_policies(config: Config) -> None:
         InputError: names the key and the policy.
     """
     from ..environment import make
-    from .initial import initial_policy
+    from .networks.initial import initial_policy
     from .worlds import teacher_of
 
     if config.training.imitation is not None:

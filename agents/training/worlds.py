@@ -10,14 +10,14 @@ from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecMonitor, 
 from dms_core.errors import InputError
 
 from ..environment import ENVIRONMENT, make, make_sb3_worlds
-from .algorithms import arguments
-from .config import Config
-from .critic import actor_size
-from .teacher import Teacher
+from .learners.algorithms import arguments
+from .learners.critic import actor_size
+from .settings.config import Config
 from .wrappers.action_repeat import ActionRepeat
 from .wrappers.low_pass import LowPassObservations, kept_shares
 from .wrappers.paired_rewards import PairedRewards
 from .wrappers.taught import Taught
+from .wrappers.teacher import Teacher
 
 
 def training_worlds(

@@ -95,7 +95,7 @@ class Drive(Settings):
     def start(self, device: Exoskeleton, holding_tension: float) -> np.ndarray:
         """Each command at the start on psi, where a tension [N] of the lifting rope would hold the arm.
 
-        What a command that is no tension takes of it depends on the angle (world/reset.py) and is left out.
+        What a command that is no tension takes of it depends on the angle (world/kernels/reset.py) and is left out.
         """
         tensions = np.array([c.carries is None for c in self.commands(device)])
         table = self.start_table(device)

@@ -90,8 +90,8 @@ class Ecosystem(Settings):
         """Parts beside arm, device and machine: none here; an ecosystem of one's own gives them.
 
         In an environment their bodies must not move where the elbow rests, and every number of theirs must be linear in
-        the monomials of world/scaling.py, as that of a constant spring, of a mass or of a length that grows with the
-        height is; a number that is not is refused by name.
+        the monomials of world/kernels/scaling.py, as that of a constant spring, of a mass or of a length that grows
+        with the height is; a number that is not is refused by name.
         """
         return ()
 

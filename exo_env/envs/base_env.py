@@ -52,14 +52,14 @@ from exo_env.envs.settings import (
 from exo_env.patient.population import population
 from exo_env.rendering.scene import Scene
 from exo_env.tables import STATUS
-from exo_env.tasks.channels import Parts, Slice
-from exo_env.tasks.movement import Movement
-from exo_env.tasks.observer import Observer
+from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.observation.channels import Parts, Slice
+from exo_env.tasks.observation.observer import Observer
 from exo_env.tasks.task import NOTHING, Task
-from exo_env.world.control_period import finish, move, next_stop, run_period
-from exo_env.world.episode import Episode
-from exo_env.world.held_episode import take_up
-from exo_env.world.readout import Readout
+from exo_env.world.episodes.episode import Episode
+from exo_env.world.episodes.held_episode import take_up
+from exo_env.world.episodes.readout import Readout
+from exo_env.world.kernels.control_period import finish, move, next_stop, run_period
 from exo_env.world.world import PatientWorld
 
 
@@ -230,7 +230,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
         """Last part of a reset.
 
         Args:
-            code: what came of the compiled part, see world/reset.py.
+            code: what came of the compiled part, see world/kernels/reset.py.
 
         Raises:
             InputError: the arm could bring the rope's end to a pulley.

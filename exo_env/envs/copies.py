@@ -13,8 +13,8 @@ from typing import Any, Self
 
 from gymnasium.envs.registration import EnvSpec
 
-from exo_env.world.episode import Episode
-from exo_env.world.held_episode import HeldEpisode, hold
+from exo_env.world.episodes.episode import Episode
+from exo_env.world.episodes.held_episode import HeldEpisode, hold
 from exo_env.world.world import PatientWorld
 
 TRANSIENT = ("_episode", "_readout", "_renderer", "world")

@@ -18,7 +18,7 @@ from exo_env.envs.settings import load_distribution, owned, within
 from exo_env.patient.distributions import Distribution, Draws
 from exo_env.patient.population import Population, population
 from exo_env.streams import stream, uniform
-from exo_env.tasks.movement import START, Movement
+from exo_env.tasks.movements.movement import START, Movement
 from exo_env.world.draw import Draw
 
 OPTIONS = ("patient", "load", "reference", "initial_angle_deg")

@@ -10,8 +10,8 @@ from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.settings import EnvSettings, check_whole
 from exo_env.envs.vector_env import AssistanceVectorEnv
 from exo_env.tasks.lift import LiftTask
-from exo_env.tasks.movement import Movement
-from exo_env.tasks.repetition import MOST_REPETITIONS, Repetitions
+from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.movements.repetition import MOST_REPETITIONS, Repetitions
 from exo_env.tasks.task import Task
 
 TIME = 6.0
@@ -96,7 +96,7 @@ class ElbowLiftEnv(AssistanceEnv):
 
     ## Rewards
     The sum of five terms times their weights; `info["reward_terms"]` and `info["reward_weights"]` hold both, and
-    `exo_env/tasks/rewards.py` gives reasons and sources.
+    `exo_env/tasks/judgement/rewards.py` gives reasons and sources.
 
     | Term       | Value                                                    | Weight |
     |------------|----------------------------------------------------------|--------|

@@ -13,11 +13,11 @@ from exo_env.drives.modes import WITHOUT_REFERENCE
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.settings import EnvSettings, check_whole
 from exo_env.envs.vector_env import AssistanceVectorEnv
-from exo_env.tasks.channels import Parts
 from exo_env.tasks.hidden_intent import HiddenIntentTask, NewPatientTask
-from exo_env.tasks.intentions import Intentions
-from exo_env.tasks.movement import Movement
-from exo_env.tasks.repetition import MOST_REPETITIONS
+from exo_env.tasks.movements.intentions import Intentions
+from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.movements.repetition import MOST_REPETITIONS
+from exo_env.tasks.observation.channels import Parts
 from exo_env.tasks.task import Task
 
 TIME = 9.0
@@ -75,12 +75,12 @@ class HiddenIntentEnv(AssistanceEnv):
     | 6   | last_action, second   | -1   | 1   | -     | 1     |
 
     "emg" has six envelopes with unknown gains, crosstalk, delay, noise, channels that drop out and electrodes that are
-    put on anew (`exo_env/tasks/electrodes.py`); "imu" the forearm's rate and specific force; "privileged" the patient's
-    traits, true states and the plan; "clock" the time since the episode began, which no worn device knows and only an
-    ablation may see. Groups and single channels ("emg.emg") are composed by name.
+    put on anew (`exo_env/tasks/observation/electrodes.py`); "imu" the forearm's rate and specific force; "privileged"
+    the patient's traits, true states and the plan; "clock" the time since the episode began, which no worn device knows
+    and only an ablation may see. Groups and single channels ("emg.emg") are composed by name.
 
     ## Rewards
-    The sum of six terms times their weights (`exo_env/tasks/intent_rewards.py` gives reasons and sources).
+    The sum of six terms times their weights (`exo_env/tasks/judgement/intent_rewards.py` gives reasons and sources).
 
     | Term       | Value                                                                      | Weight |
     |------------|----------------------------------------------------------------------------|--------|
@@ -101,10 +101,10 @@ class HiddenIntentEnv(AssistanceEnv):
 
     ## Arguments
     Those of `exo/ElbowLift`, with another default of `action_mode`; `reference` are the distributions of `Intentions`
-    (`exo_env/tasks/intentions.py`): start_deg, rest, targets, amplitude_deg, duration, pause, picked_up, and the shares
-    changes_of_mind and load_changes. `electrodes` says how much may be wrong with the electrodes: gain_deviation (0.3),
-    crosstalk (at most 0.2) and dropping (0.2, the share of the episodes in which a channel drops out). With
-    `repetitions` the patient has a plan in each of several windows of `episode_duration / repetitions`;
+    (`exo_env/tasks/movements/intentions.py`): start_deg, rest, targets, amplitude_deg, duration, pause, picked_up, and
+    the shares changes_of_mind and load_changes. `electrodes` says how much may be wrong with the electrodes:
+    gain_deviation (0.3), crosstalk (at most 0.2) and dropping (0.2, the share of the episodes in which a channel drops
+    out). With `repetitions` the patient has a plan in each of several windows of `episode_duration / repetitions`;
     `exo/NewPatient-v0` has 8 of them with one patient: fatigue goes on, the load changes, and electrodes are put on
     anew midway.
 

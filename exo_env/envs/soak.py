@@ -6,6 +6,7 @@ import contextlib
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -45,38 +46,65 @@ def soak(
     """
     world = _made(env, {"patient": "evaluation"} | settings)
     actions = np.random.default_rng(seed)
-    ends: Counter[str] = Counter()
-    failures: list[str] = []
-    bad, worst = 0, {"phi": 0.0, "phi_v": 0.0, "drift_rad": 0.0, "step_ms": 0.0}
-    observation, _ = world.reset(seed=seed)
-    begin, done = time.perf_counter(), 0
+    found = _Found()
+    world.reset(seed=seed)
+    begin = time.perf_counter()
     with contextlib.suppress(KeyboardInterrupt):
-        for k in range(steps):
+        for _ in range(steps):
             before = time.perf_counter()
             action = actions.uniform(-1.0, 1.0, world.action_space.shape)
             observation, reward, terminated, truncated, info = world.step(action)
-            worst["step_ms"] = max(worst["step_ms"], 1e3 * (time.perf_counter() - before))
-            bad += not (
-                np.isfinite(observation).all() and np.isfinite(reward) and observation in world.observation_space
-            )
-            done = k + 1
-            if info["solver_failed"]:
-                failures.append(info["event"])
-            if terminated or truncated or done == steps:
-                ends[_end(world, truncated)] += 1
-                r = world.readings()
-                worst["phi"] = max(worst["phi"], r["solver.largest_phi"])
-                worst["phi_v"] = max(worst["phi_v"], r["solver.largest_phi_v"])
-                worst["drift_rad"] = max(worst["drift_rad"], abs(r["tracking.drift"]))
-                observation, _ = world.reset()
+            took = 1e3 * (time.perf_counter() - before)
+            usual = np.isfinite(reward) and np.isfinite(observation).all() and observation in world.observation_space
+            found.add_step(took, bool(usual), info)
+            if terminated or truncated or found.steps == steps:
+                found.add_end(_end(world, truncated), world.readings())
+                world.reset()
             if progress is not None:
-                progress(done)
-    return {
-        "steps": done, "episodes": sum(ends.values()), "ends": dict(ends), "not_finite_or_outside": bad,
-        "failed_solves": len(failures), "failures": failures, "largest_phi": worst["phi"],
-        "largest_phi_v": worst["phi_v"], "largest_drift_rad": worst["drift_rad"],
-        "slowest_step_ms": worst["step_ms"], "steps_per_second": done / (time.perf_counter() - begin),
-    }  # fmt: skip
+                progress(found.steps)
+    return found.summary(time.perf_counter() - begin)
+
+
+@dataclass
+class _Found:
+    """What a run has found so far."""
+
+    steps: int = 0
+    bad: int = 0
+    """Steps that gave a number which is not finite, or an observation outside of its space."""
+    failures: list[str] = field(default_factory=list)
+    """Sentences of failed solves."""
+    ends: Counter[str] = field(default_factory=Counter)
+    slowest: float = 0.0
+    """Longest step [ms]."""
+    phi: float = 0.0
+    phi_v: float = 0.0
+    drift: float = 0.0
+    """Largest one [rad]."""
+
+    def add_step(self, milliseconds: float, usual: bool, info: dict[str, Any]) -> None:
+        """A step, and whether what it gave is finite and inside its space."""
+        self.steps += 1
+        self.slowest = max(self.slowest, milliseconds)
+        self.bad += not usual
+        if info["solver_failed"]:
+            self.failures.append(info["event"])
+
+    def add_end(self, why: str, readings: dict[str, float]) -> None:
+        """The end of an episode."""
+        self.ends[why] += 1
+        self.phi = max(self.phi, readings["solver.largest_phi"])
+        self.phi_v = max(self.phi_v, readings["solver.largest_phi_v"])
+        self.drift = max(self.drift, abs(readings["tracking.drift"]))
+
+    def summary(self, seconds: float) -> dict[str, Any]:
+        """All of it, after a run of so many seconds."""
+        return {
+            "steps": self.steps, "episodes": sum(self.ends.values()), "ends": dict(self.ends),
+            "not_finite_or_outside": self.bad, "failed_solves": len(self.failures), "failures": self.failures,
+            "largest_phi": self.phi, "largest_phi_v": self.phi_v, "largest_drift_rad": self.drift,
+            "slowest_step_ms": self.slowest, "steps_per_second": self.steps / seconds,
+        }  # fmt: skip
 
 
 def _made(name: str, settings: dict[str, Any]) -> AssistanceEnv:

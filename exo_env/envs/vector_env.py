@@ -24,8 +24,8 @@ from exo_env.envs.settings import check_whole
 from exo_env.tables import STATUS
 from exo_env.tasks.task import NOTHING, SOLVER, Task
 from exo_env.world.batch import ELSEWHERE, Batch
-from exo_env.world.episode import Episode
-from exo_env.world.reset import BEGUN
+from exo_env.world.episodes.episode import Episode
+from exo_env.world.kernels.reset import BEGUN
 
 EPISODE = attrgetter("_episode")
 """Gives the episode of an environment, None where there is none: cheaper than the property, which raises."""

@@ -28,7 +28,7 @@ from tqdm import tqdm
 from exo_env.ecosystem.exoskeleton import rope_lever
 from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.patient.motor_command import InternalModel
+from exo_env.patient.excitation.motor_command import InternalModel
 
 PEAK_RATES = (42.0, 84.0, 126.0)
 """Largest rates of the moves [deg/s]."""

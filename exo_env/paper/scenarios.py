@@ -26,7 +26,7 @@ from dms_core.model import MinimumJerk
 from exo_env.ecosystem.arm import USUAL_RANGE_DEG, Arm
 from exo_env.ecosystem.ecosystem import Ecosystem, Proprioception
 from exo_env.ecosystem.gym_machine import GymMachine
-from exo_env.patient.motor_command import InternalModel, MotorCommand, plan
+from exo_env.patient.excitation.motor_command import InternalModel, MotorCommand, plan
 from exo_env.settings import Settings
 
 FILES = ("1_healthy", "2_passive", "3_impaired", "4_heavy")

@@ -26,9 +26,9 @@ from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import dot, vec
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.ecosystem.exoskeleton import link_moment
-from exo_env.patient.motor_command import InternalModel
+from exo_env.patient.excitation.motor_command import InternalModel
+from exo_env.patient.excitation.static_optimisation import muscle_moment, needed_moment, needed_moments, with_weight
 from exo_env.patient.patient import MIDDLE, PATIENT, Patient
-from exo_env.patient.static_optimisation import muscle_moment, needed_moment, needed_moments, with_weight
 
 ABLE = 0.2
 """Ability from which a patient can do something [-]."""

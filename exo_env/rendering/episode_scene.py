@@ -11,8 +11,8 @@ from exo_env.ecosystem.gym_machine import HANDLE, WEIGHT
 from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.rendering.scene import MusclePath, RopePath, Scene
 from exo_env.tables import STATUS
-from exo_env.world.episode import Episode
-from exo_env.world.readout import Readout
+from exo_env.world.episodes.episode import Episode
+from exo_env.world.episodes.readout import Readout
 
 UPPER_END = 0.22
 """Drawn length of the upper link [m]."""

@@ -22,6 +22,8 @@ DASHES = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)))
 """Dashes of curves in turn; with seven colours the same line comes again after 28."""
 FORMATS = (".png", ".svg", ".pdf")
 """Endings of pictures that can be written."""
+DIVISIONS = ((2.5, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)), (10.0, (1.0, 2.0, 5.0)), (300.0, (1.0, 3.0)))
+"""Ratios of the ends of a logarithmic axis, and the places with labels in a decade up to each; beyond, its ends."""
 LETTERS_AN_INCH = 14.0
 """Letters of a note that fit into an inch."""
 
@@ -108,14 +110,44 @@ def note(figure: Any, sentences: Sequence[str]) -> None:
         figure.supxlabel(literal("\n".join(lines)), fontsize=8, color="0.25")
 
 
+def log_scale(ax: Any, axis: str) -> None:
+    """A logarithmic axis "x" or "y" with few plain numbers; call it when the curves are drawn."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    ax.set(**{f"{axis}scale": "log"})
+    one = ax.xaxis if axis == "x" else ax.yaxis
+    low, high = one.get_view_interval()
+    places = next((places for ratio, places in DIVISIONS if high < ratio * low), (1.0,))
+    one.set_major_locator(LogLocator(subs=places))
+    one.set_major_formatter(StrMethodFormatter("{x:g}"))
+    # Labels between these would be printed over each other in a small panel.
+    one.set_minor_formatter(NullFormatter())
+
+
+def _break_titles(figure: Any) -> None:
+    """Break the titles of several panels where they are wider than their panel: beside it stand letters."""
+    shown = visible(figure)
+    titled = [ax for ax in shown if ax.get_title()] if len(shown) > 1 else []
+    if titled:
+        # Places and sizes of panels are known once they have been laid out.
+        figure.draw_without_rendering()
+    for ax in titled:
+        fitting = ax.get_window_extent().width / ax.title.get_window_extent().width
+        if fitting < 1.0:
+            lines = ax.get_title().split("\n")
+            width = max(int(fitting * max(map(len, lines))), 1)
+            ax.title.set_text("\n".join(textwrap.fill(line, width, break_long_words=False) for line in lines))
+
+
 def literal(text: str) -> str:
     """A text for a figure as it stands: in that of a user, $ begins no formula."""
     return text.replace("$", r"\$")
 
 
 def save(figure: Any, path: Path) -> Path:
-    """Write a picture whole or not at all, as its name ends; several panels get letters."""
+    """Write a picture whole or not at all, as its name ends; several panels get letters, which no title reaches."""
     shown = visible(figure)
+    _break_titles(figure)
     for ax in shown if len(shown) > 1 else ():
         ax.annotate(
             letter(figure, ax), (0.0, 1.0), xytext=(-8.0, 5.0), xycoords="axes fraction", textcoords="offset points",

@@ -15,7 +15,7 @@ from dms_core.errors import InputError, choices
 from dms_core.validation import plain
 from exo_env.kernel_checks import check_kernel, uses
 from exo_env.patient.patient import FIELDS
-from exo_env.tasks.channels import Channel, Parts, Reading
+from exo_env.tasks.observation.channels import Channel, Parts, Reading
 
 INFO_NAMES = (
     "reward_terms", "reward_weights", "time", "solver_failed", "event",

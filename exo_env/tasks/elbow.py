@@ -12,13 +12,13 @@ from dms_core.compiled.jit import compiled
 from dms_core.kernels import floats, inner, matrix
 from exo_env.ecosystem.sensors import muscle_sensor, tension_sensor
 from exo_env.patient.ability import lacking_when
-from exo_env.patient.effort import PRESENT
+from exo_env.patient.excitation.effort import PRESENT
+from exo_env.patient.excitation.slacking import MOST_EFFORT
 from exo_env.patient.patient import PATIENT
-from exo_env.patient.slacking import MOST_EFFORT
 from exo_env.places import places
 from exo_env.tables import DRIVE, EFFORT, PATIENT_TABLES, PLAN, WORLD
-from exo_env.tasks.channels import Channel, Imperfection, Parts, Reading, trait_channels, trait_readings
 from exo_env.tasks.checked import begins
+from exo_env.tasks.observation.channels import Channel, Imperfection, Parts, Reading, trait_channels, trait_readings
 from exo_env.tasks.task import first_of, readings, step_of
 
 

@@ -9,8 +9,8 @@ from dms_core.kernels import floats, inner, matrix
 from exo_env.settings import Settings
 from exo_env.tables import DRIVE, PLAN, WORLD
 from exo_env.tasks.elbow import ELBOW, lacking_of
-from exo_env.tasks.limits import EVENTS, Limits, exceeded, limit_sentence
-from exo_env.tasks.rewards import term_values
+from exo_env.tasks.judgement.limits import EVENTS, Limits, exceeded, limit_sentence
+from exo_env.tasks.judgement.rewards import term_values
 from exo_env.tasks.task import (
     NOTHING,
     Task,

@@ -8,7 +8,6 @@ from typing import ClassVar
 from dms_core.compiled.jit import compiled
 from exo_env.places import places
 from exo_env.settings import Settings
-from exo_env.tasks.channels import Channel, Parts, Reading
 from exo_env.tasks.checked import begins
 from exo_env.tasks.elbow import (
     action_channel,
@@ -19,9 +18,10 @@ from exo_env.tasks.elbow import (
     read_elbow,
 )
 from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
-from exo_env.tasks.movement import Movement
-from exo_env.tasks.repetition import Repetitions
-from exo_env.tasks.rewards import TRACKING_WIDTH, Weights
+from exo_env.tasks.judgement.rewards import TRACKING_WIDTH, Weights
+from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.movements.repetition import Repetitions
+from exo_env.tasks.observation.channels import Channel, Parts, Reading
 from exo_env.tasks.task import Reported, first_of
 
 

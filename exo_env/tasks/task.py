@@ -37,9 +37,9 @@ from dms_core.kernels import floats, inner, ints
 from exo_env.patient.distributions import Distribution
 from exo_env.settings import Settings, given_mapping
 from exo_env.tables import STATUS, TASK, WORLD
-from exo_env.tasks.channels import Channel, Parts, Reading, Slice, first_places
 from exo_env.tasks.checked import check_task
-from exo_env.tasks.movement import Movement
+from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.observation.channels import Channel, Parts, Reading, Slice, first_places
 
 NOTHING, SOLVER, FIRST_EVENT = range(3)
 """Codes of what ended an episode: nothing, a solver that failed, and the first event of the task's own."""

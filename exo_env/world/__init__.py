@@ -12,11 +12,11 @@ Words of exo_env, each for one thing:
     psi            the elbow angle over time [rad] that the patient intends and errors are measured from
     reference      another word for psi, in channels, figures and papers; the argument `reference` of an environment
                    changes the distributions of its movement
-    movement       a family of psi, one for each row of numbers (tasks/movement.py)
+    movement       a family of psi, one for each row of numbers (tasks/movements/movement.py)
     course         psi, its rate and its acceleration at several times, shape (k, 3)
     need, ability  the moment that the movement needs; the share of it that the patient can give (patient/ability.py)
-    motor command  activations that the patient plans along psi (patient/motor_command.py)
-    effort         factor s on the motor command, which falls and rises with the error (patient/slacking.py)
+    motor command  activations that the patient plans along psi (patient/excitation/motor_command.py)
+    effort         factor s on the motor command, which falls and rises with the error (patient/excitation/slacking.py)
     excitation     input of a muscle, between 0.01 and 1; activation is what the muscle makes of it
     action         numbers from -1 to 1 that an agent gives for a control period
     drive          what makes commands of an action (drives/drive.py)

@@ -13,8 +13,8 @@ import numpy as np
 from dms_core.compiled.jit import compiled
 from dms_core.kernels import DONE, Packed, floats, inner, ints, table_at
 from exo_env.tables import OBSERVER, STATUS, TASK, WORLD
-from exo_env.world.control_period import run_period
-from exo_env.world.reset import BEGUN, begin_episode
+from exo_env.world.kernels.control_period import run_period
+from exo_env.world.kernels.reset import BEGUN, begin_episode
 from exo_env.world.work_sharing import AREAS, areas_of, claim, fetch_ahead
 
 FIELDS = len(WORLD)

@@ -24,8 +24,8 @@ from exo_env.ecosystem.gym_machine import HANDLE, ROPE, WEIGHT, reach_error
 from exo_env.ecosystem.person import SEXES
 from exo_env.ecosystem.worn_exoskeleton import HINGE, LOWER, PID
 from exo_env.patient.ability import Need
-from exo_env.patient.effort import TICK, new_effort
-from exo_env.patient.motor_command import arm_table, load_table, unsettled
+from exo_env.patient.excitation.effort import TICK, new_effort
+from exo_env.patient.excitation.motor_command import arm_table, load_table, unsettled
 from exo_env.patient.patient import FIELDS, PATIENT
 from exo_env.streams import stream
 from exo_env.tables import (
@@ -45,15 +45,15 @@ from exo_env.tables import (
     TaskTables,
     WorldTables,
 )
-from exo_env.tasks.channels import first_places
 from exo_env.tasks.checked import check_movement, check_sensors
-from exo_env.tasks.movement import Movement
-from exo_env.tasks.observer import Observer
+from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.observation.channels import first_places
+from exo_env.tasks.observation.observer import Observer
 from exo_env.tasks.task import Task
 from exo_env.world.draw import Draw
-from exo_env.world.episode_code import EPISODE_CODE
-from exo_env.world.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
-from exo_env.world.scaling import TEMPLATE_ANGLE, declared, scaling_of
+from exo_env.world.kernels.episode_code import EPISODE_CODE
+from exo_env.world.kernels.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
+from exo_env.world.kernels.scaling import TEMPLATE_ANGLE, declared, scaling_of
 
 compile_beside_models(EPISODE_CODE)
 

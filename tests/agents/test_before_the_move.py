@@ -12,9 +12,9 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import ENVIRONMENT
-from agents.evaluation.evaluate import evaluate
+from agents.evaluation.comparison.evaluate import evaluate
 from agents.policies.learned import find_policy
-from agents.training.config import Config
+from agents.training.settings.config import Config
 from dms_core.errors import ModelWarning
 
 FILES = Path(__file__).with_name("before_the_move")
@@ -87,7 +87,10 @@ def test_a_report_takes_evaluations_and_trainings(trainings, tmp_path, monkeypat
     [
         ("learned", "policies.learned"),
         ("train", "training.run"),
-        ("evaluate", "evaluation.evaluate"),
+        ("evaluate", "evaluation.comparison.evaluate"),
+        ("evaluation.evaluate", "evaluation.comparison.evaluate"),
+        ("training.config", "training.settings.config"),
+        ("commands.video", "commands.pictures.video"),
         ("traces", "training.wrappers.low_pass"),
         ("rllib", "distributed.rllib"),
     ],
@@ -106,6 +109,12 @@ def test_old_imports_work_with_a_warning(old, new):
     assert done.stdout.splitlines() == [f"'agents.{old}' is now 'agents.{new}'; import it by that name.", "True"]
 
 
+def test_a_module_that_moved_within_its_folder_comes_from_there():
+    with pytest.warns(FutureWarning, match="'agents.evaluation.figure' is now 'agents.evaluation.figures.figure'"):
+        from agents.evaluation import figure
+    assert figure.__name__ == "agents.evaluation.figures.figure"
+
+
 def test_every_old_module_is_somewhere():
     from importlib.util import find_spec
 
@@ -120,7 +129,7 @@ def test_every_old_module_is_somewhere():
     [
         ("agents.policies.lagging_pid", "YieldingPid", "LaggingPid"),
         ("agents.training.wrappers.action_repeat", "Held", "ActionRepeat"),
-        ("agents.evaluation.time_course", "course", "time_course"),
+        ("agents.evaluation.episodes.time_course", "course", "time_course"),
         ("agents.export", "from_zip", "agents.export.model_zip.from_zip"),
     ],
 )

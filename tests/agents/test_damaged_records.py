@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from agents.checkpoint import Store
-from agents.commands.report_input import collected
-from agents.evaluation.evaluate import VERSION
+from agents.commands.pictures.report_input import collected
+from agents.evaluation.comparison.evaluate import VERSION
 from agents.policies.safetensors import from_bytes, to_bytes
 from agents.policies.tuned import Range, numbers
 from dms_core.errors import DmsError, InputError
@@ -116,8 +116,8 @@ def test_evaluations_say_their_version_and_older_ones_are_read(evaluation):
 )
 def test_unusual_evaluations_are_drawn(path, value, evaluation, tmp_path):
     pytest.importorskip("matplotlib")
-    from agents.commands.report import _badness, _evaluation
-    from agents.evaluation.figure import draw
+    from agents.commands.pictures.report import _badness, _evaluation
+    from agents.evaluation.figures.figure import draw
 
     file, content = evaluation
     file.write_text(json.dumps(changed(content, path, value)))
@@ -169,7 +169,7 @@ def test_damaged_checkpoints(said, pointer, hashes, tmp_path):
 
 def test_archives_that_unpack_to_more_than_they_are(tmp_path):
     pytest.importorskip("stable_baselines3")
-    from agents.training.model_state import _read
+    from agents.training.files.model_state import _read
 
     path = tmp_path / "random.npz"
     np.savez_compressed(path, torch=np.zeros(10**7, np.uint8))
@@ -197,7 +197,7 @@ def test_archives_that_unpack_to_more_than_they_are(tmp_path):
 def test_damaged_pickles_are_one_sentence(content, tmp_path):
     pytest.importorskip("stable_baselines3")
     from agents.export.model_zip import _read, _statistics
-    from agents.training.algorithms import find
+    from agents.training.learners.algorithms import find
 
     path = tmp_path / "vecnormalize.pkl"
     path.write_bytes(content)

@@ -7,7 +7,7 @@ from gymnasium.envs.registration import register
 
 from agents.environment import ENVIRONMENT, check_settings, environment_id, make, make_vector
 from agents.policies.learned import find_policy
-from agents.training.config import Config
+from agents.training.settings.config import Config
 from dms_core.errors import InputError
 from exo_env.envs import lookup
 from tests.agents.other_environments import LIFT
@@ -24,7 +24,7 @@ def newer(monkeypatch):
         id=NEXT, entry_point=LIFT.entry_point, vector_entry_point=LIFT.vector_entry_point, disable_env_checker=True
     )
     monkeypatch.delitem(gymnasium.registry, ENVIRONMENT)
-    monkeypatch.setattr("agents.training.config_file.ENVIRONMENT", NEXT)
+    monkeypatch.setattr("agents.training.settings.config_file.ENVIRONMENT", NEXT)
     yield
     del gymnasium.registry[NEXT]
     lookup._say_once.cache_clear()

@@ -12,14 +12,14 @@ import pytest
 
 from agents.__main__ import main
 from agents.checkpoint import Store
-from agents.commands.report_input import collected
+from agents.commands.pictures.report_input import collected
 from agents.environment import ENVIRONMENT, make
-from agents.evaluation.evaluate import evaluate
-from agents.evaluation.evaluation_file import read_evaluation
-from agents.evaluation.time_course import time_course
+from agents.evaluation.comparison.evaluate import evaluate
+from agents.evaluation.episodes.time_course import time_course
+from agents.evaluation.results.evaluation_file import read_evaluation
 from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint
 from agents.policies.safetensors import from_bytes
-from agents.training.records import read_curve, read_record
+from agents.training.files.records import read_curve, read_record
 from dms_core.errors import InputError, ModelWarning
 from dms_core.files.json_text import MOST_KEYS, MOST_VALUES, parse_json
 
@@ -149,7 +149,7 @@ def by_time_course(one, settings):
 
 def by_video(one, settings):
     pytest.importorskip("pygame")
-    from agents.commands.video import Stage
+    from agents.commands.pictures.video import Stage
 
     Stage(one, "stroke_mild", 0, **settings)
 
@@ -321,7 +321,7 @@ def test_time_and_memory_are_bounded(file, harm, policy):
     code = f"""
 import re, sys, time
 from pathlib import Path
-from agents.evaluation.evaluation_file import read_evaluation
+from agents.evaluation.results.evaluation_file import read_evaluation
 from agents.policies.learned import LearnedPolicy
 from dms_core.errors import DmsError, InputError, ModelWarning
 folder = Path(sys.argv[1])

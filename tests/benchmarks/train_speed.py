@@ -23,8 +23,8 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 
-from agents.training.algorithms import build
-from agents.training.config import Config
+from agents.training.learners.algorithms import build
+from agents.training.settings.config import Config
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.envs.elbow_lift_sb3 import ElbowLiftVecEnv
 from tests.benchmarks import csv_file

@@ -1,14 +1,16 @@
-"""Folders of the core import in one direction, and no files of the core or of exo_env import each other in a circle."""
+"""Folders of the core import in one direction, and no files of a package import each other in a circle."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+import agents
 import dms_core
 import exo_env
 
@@ -21,6 +23,34 @@ ABOVE = {
     "files": {"compiled", "linear", "model", "assembly", "simulation"},
 }
 """What a folder must not import."""
+ORDER = {
+    "agents.commands": ("options", "evaluate", "training", "search", "studies", "pictures"),
+    "agents.evaluation": ("episodes", "comparison", "sharing", "results", "search", "studies", "figures"),
+    "agents.training": (
+        "settings",
+        "wrappers",
+        "learners",
+        "networks",
+        "worlds",
+        "usable",
+        "files",
+        "learning_curve",
+        "run",
+    ),
+    "exo_env.tasks": (
+        "observation",
+        "checked",
+        "movements",
+        "task",
+        "judgement",
+        "elbow",
+        "elbow_task",
+        "lift",
+        "hidden_intent",
+    ),
+    "exo_env.world": ("draw", "work_sharing", "kernels", "world", "batch", "episodes"),
+}
+"""What a folder holds: each may import those before it."""
 
 
 def _module(path: Path, root: Path) -> str:
@@ -68,7 +98,20 @@ def test_no_file_imports_from_a_folder_above(folder):
     assert not wrong
 
 
-@pytest.mark.parametrize("package", [dms_core, exo_env], ids=lambda package: package.__name__)
+@pytest.mark.parametrize("folder", ORDER)
+def test_what_a_folder_holds_imports_in_one_direction(folder):
+    package = import_module(folder.partition(".")[0])
+    root, here = Path(package.__file__).parent, folder.split(".")
+    inside = root.joinpath(*here[1:])
+    assert {path.stem for path in inside.iterdir() if not path.name.startswith("_")} == set(ORDER[folder])
+    for path in sorted(inside.rglob("*.py")):
+        mine = path.relative_to(inside).with_suffix("").parts[0]
+        found = {name.split(".")[2] for name in _imported(path, root) if name.startswith(f"{folder}.")} - {mine}
+        after = found - set(ORDER[folder][: ORDER[folder].index(mine)]) if mine != "__init__" else found
+        assert not after & set(ORDER[folder]), f"{path.relative_to(root.parent)} imports {sorted(after)}"
+
+
+@pytest.mark.parametrize("package", [dms_core, exo_env, agents], ids=lambda package: package.__name__)
 def test_no_circle_of_files(package):
     circle = _circle(Path(package.__file__).parent)
     assert not circle, " imports ".join(circle)

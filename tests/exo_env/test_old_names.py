@@ -1,4 +1,4 @@
-"""Names of version 0.1 load with a warning, or end in an error that names what replaces them."""
+"""Names of older versions load with a warning, or end in an error that names what replaces them."""
 
 import subprocess
 import sys
@@ -50,6 +50,18 @@ def test_what_a_users_project_wrote_in_version_0_1():
     assert Ecosystem().weight == 1.0
     with pytest.raises(ImportError, match="Muscles come from the arm"):
         from exo_env.human import MUSCLES  # noqa: F401
+
+
+@pytest.mark.filterwarnings("ignore::FutureWarning")
+def test_what_a_users_project_wrote_in_version_0_3():
+    from exo_env.tasks.movement import Movement
+    from exo_env.world.episode import Episode
+
+    from exo_env.tasks import rewards
+
+    assert rewards.Weights is import_module("exo_env.tasks.judgement.rewards").Weights
+    assert Movement is import_module("exo_env.tasks.movements.movement").Movement
+    assert Episode is import_module("exo_env.world.episodes.episode").Episode
 
 
 @pytest.mark.filterwarnings("ignore:'exo_env.human:FutureWarning")

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from agents.checkpoint import Store
 from agents.commands.options import device_settings
 from agents.environment import ENVIRONMENT, make
-from agents.evaluation.evaluation_file import read_evaluation
-from agents.evaluation.pooling import pooled
-from agents.evaluation.tables import short_table, whole_table
+from agents.evaluation.comparison.pooling import pooled
+from agents.evaluation.results.evaluation_file import read_evaluation
+from agents.evaluation.results.tables import short_table, whole_table
 from agents.policies.learned import SHIPPED, LearnedPolicy, fingerprint, repetitions_of
 from agents.policies.safetensors import from_bytes, to_bytes
-from agents.training.records import read_curve, read_point, read_record, read_state
+from agents.training.files.records import read_curve, read_point, read_record, read_state
 from dms_core.files.outputs import MANIFEST, Outputs
 from exo_env.ecosystem.bare_arm import read_excitations
 from tests.fuzz.damage import is_read_or_refused, of_bytes, of_json
@@ -112,7 +112,7 @@ def tabulated(path):
 
 @pytest.fixture
 def few_resamples(monkeypatch):
-    monkeypatch.setattr("agents.evaluation.statistics.RESAMPLES", 10)
+    monkeypatch.setattr("agents.evaluation.comparison.statistics.RESAMPLES", 10)
 
 
 @given(of_json(EVALUATION))
@@ -181,8 +181,8 @@ def test_excitations(folder, content):
 def model():
     """A small model that goes on from files, and the folder of whole ones."""
     pytest.importorskip("stable_baselines3")
-    from agents.training.algorithms import build
-    from agents.training.config import Config
+    from agents.training.learners.algorithms import build
+    from agents.training.settings.config import Config
     from agents.training.worlds import wrapped
     from tests.agents.tiny import content
 
@@ -195,7 +195,7 @@ def checkpoint(model, folder):
     """Whole files of the model; states of what is random are put back in the end."""
     import torch
 
-    from agents.training.model_state import save_state
+    from agents.training.files.model_state import save_state
 
     states = np.random.get_state(), random.getstate(), torch.get_rng_state()
     place = folder / "checkpoint"
@@ -209,7 +209,7 @@ def checkpoint(model, folder):
 
 def load_part(file, model, path):
     """Put one file of a checkpoint into a model."""
-    from agents.training import model_state
+    from agents.training.files import model_state
 
     if file == "model.zip":
         model_state._load_networks(model, path)

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.environment import ENVIRONMENT
-from agents.training.config import Config
+from agents.training.settings.config import Config
 from dms_core.config_files import configs
 from dms_core.errors import DmsError
 from dms_core.model_file import load
@@ -38,7 +38,7 @@ MOST_CHARACTERS, MOST_LINES = 1200, 6
 def arguments() -> Callable[[Config], Any]:
     """The check of an algorithm's arguments, where the libraries of training are installed."""
     try:
-        from agents.training.algorithms import arguments as check
+        from agents.training.learners.algorithms import arguments as check
     except ImportError:
         return lambda config: None
     return check

@@ -15,8 +15,8 @@ from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.ecosystem.person import Person
-from exo_env.patient.motor_command import InternalModel
-from exo_env.patient.static_optimisation import needed_moment
+from exo_env.patient.excitation.motor_command import InternalModel
+from exo_env.patient.excitation.static_optimisation import needed_moment
 
 ANGLES = np.radians(np.arange(0.0, 144.0, 2.0))
 """Angles of the tables [rad]; between them moments err by less than 0.01 Nm."""

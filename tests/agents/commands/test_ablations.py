@@ -8,7 +8,7 @@ import yaml
 pytest.importorskip("sb3_contrib")
 
 from agents.__main__ import main
-from agents.evaluation.episode import world_of
+from agents.evaluation.episodes.episode import world_of
 from agents.policies.learned import find_policy
 from dms_core.errors import InputError
 from tests.agents.tiny import SECTIONS, TRAINING

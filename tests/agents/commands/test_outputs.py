@@ -7,9 +7,9 @@ from itertools import islice
 import pytest
 
 from agents.__main__ import main
-from agents.commands.tune_baselines import _yaml
-from agents.evaluation.tables import whole_table
-from agents.evaluation.tries import Try, table
+from agents.commands.search.tune_baselines import _yaml
+from agents.evaluation.results.tables import whole_table
+from agents.evaluation.search.tries import Try, table
 from dms_core.files.outputs import MANIFEST
 
 EVALUATE = ["evaluate", "--policy", "none", "--population", "stroke_mild", "--patients", "1"]
@@ -45,7 +45,7 @@ def test_a_film_is_replaced_with_the_flag(tmp_path, name, monkeypatch, capsys):
     pytest.importorskip("pygame")
     if name.endswith("mp4"):
         pytest.importorskip("imageio_ffmpeg")
-    from agents.commands import video
+    from agents.commands.pictures import video
 
     monkeypatch.setattr(video, "pictures", lambda stages, known=video.pictures: islice(known(stages), 6))
     command = ["video", "--policy", "none", "--out", str(tmp_path / name)]
@@ -56,7 +56,8 @@ def test_a_film_is_replaced_with_the_flag(tmp_path, name, monkeypatch, capsys):
 
 def test_numbers_of_the_baselines_are_replaced_with_the_flag(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
-        "agents.commands.tune_baselines.tune", lambda name, *given, **more: [Try(name, {"x": 1.0}, {"return": 2.0})]
+        "agents.commands.search.tune_baselines.tune",
+        lambda name, *given, **more: [Try(name, {"x": 1.0}, {"return": 2.0})],
     )
     command = ["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]
     assert [main(command), main(command), main([*command, "--overwrite"])] == [0, 2, 0]

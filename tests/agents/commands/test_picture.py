@@ -6,8 +6,8 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from agents.__main__ import main
-from agents.evaluation import policy_picture as drawing
-from agents.evaluation.policy_picture import in_words, policy_picture
+from agents.evaluation.figures import policy_picture as drawing
+from agents.evaluation.figures.policy_picture import in_words, policy_picture
 from tests.agents.evaluation.test_figures import course
 
 MEASURES = {"device_work_share": 0.642, "tracking_rms_deg": 8.34}

@@ -9,14 +9,14 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from agents.__main__ import main
-from agents.commands.report import _again
-from agents.commands.report_input import collected, grouped
-from agents.evaluation.by_patient import by_patient
-from agents.evaluation.evaluate import evaluate
-from agents.evaluation.pooling import pooled
-from agents.evaluation.report_figures import on_common_steps
-from agents.evaluation.statistics import interquartile_mean
-from agents.evaluation.time_course import time_course
+from agents.commands.pictures.report import _again
+from agents.commands.pictures.report_input import collected, grouped
+from agents.evaluation.comparison.by_patient import by_patient
+from agents.evaluation.comparison.evaluate import evaluate
+from agents.evaluation.comparison.pooling import pooled
+from agents.evaluation.comparison.statistics import interquartile_mean
+from agents.evaluation.episodes.time_course import time_course
+from agents.evaluation.figures.report_figures import on_common_steps
 from agents.policies.baselines import policy
 from dms_core.files.outputs import MANIFEST
 from tests.agents.tiny import config_file

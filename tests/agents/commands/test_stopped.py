@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from agents.__main__ import main
-from agents.commands.report_input import collected
-from agents.evaluation.shares import processes
-from agents.evaluation.tries import Try
+from agents.commands.pictures.report_input import collected
+from agents.evaluation.search.tries import Try
+from agents.evaluation.sharing.shares import processes
 from dms_core.files import output_place
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -46,7 +46,7 @@ EVALUATE = ["evaluate", "--policy", "none", "pid", "--population", "stroke_mild"
 
 
 def test_an_evaluation_keeps_the_policies_that_are_done(stopped_at, tmp_path, capsys):
-    stopped_at("agents.evaluation.evaluate.episode", 4)
+    stopped_at("agents.evaluation.comparison.evaluate.episode", 4)
     assert main([*EVALUATE, "--out", str(tmp_path)]) == 130
     part = tmp_path / "evaluation.partial.json"
     assert capsys.readouterr().err.splitlines()[-1] == f"stopped: 2 patients with none are in '{part}'."
@@ -58,7 +58,7 @@ def test_an_evaluation_keeps_the_policies_that_are_done(stopped_at, tmp_path, ca
 
 
 def test_an_evaluation_keeps_whole_patients_of_its_first_policy(stopped_at, tmp_path, capsys):
-    stopped_at("agents.evaluation.evaluate.episode", 4)
+    stopped_at("agents.evaluation.comparison.evaluate.episode", 4)
     assert main([*EVALUATE, "--loads", "1", "2", "--out", str(tmp_path)]) == 130
     found = json.loads((tmp_path / "evaluation.partial.json").read_text())
     assert found["patients"] == 1 and len(found["policies"]["none"]["episodes"]) == 2
@@ -66,7 +66,7 @@ def test_an_evaluation_keeps_whole_patients_of_its_first_policy(stopped_at, tmp_
 
 
 def test_a_part_outlives_the_next_evaluations(stopped_at, tmp_path):
-    stopped_at("agents.evaluation.evaluate.episode", 2)
+    stopped_at("agents.evaluation.comparison.evaluate.episode", 2)
     assert main(["evaluate", "--policy", "none", "--patients", "2", "--out", str(tmp_path)]) == 130
     part = tmp_path / "evaluation.partial.json"
     before = part.read_bytes()
@@ -86,7 +86,7 @@ def test_an_evaluation_says_where_its_part_is_when_the_disk_is_full(stopped_at, 
         known(target, content)
 
     monkeypatch.setattr(output_place, "_replace", full)
-    stopped_at("agents.evaluation.evaluate.episode", 4)
+    stopped_at("agents.evaluation.comparison.evaluate.episode", 4)
     assert main([*EVALUATE, "--out", str(tmp_path / "out")]) == 130
     (kept,) = (tmp_path / "temporary").iterdir()
     assert f"stopped: 2 patients with none are in '{kept}'." in capsys.readouterr().err
@@ -94,14 +94,14 @@ def test_an_evaluation_says_where_its_part_is_when_the_disk_is_full(stopped_at, 
 
 
 def test_an_evaluation_that_did_nothing_says_so(stopped_at, tmp_path, capsys):
-    stopped_at("agents.evaluation.evaluate.episode", 1)
+    stopped_at("agents.evaluation.comparison.evaluate.episode", 1)
     assert main([*EVALUATE, "--out", str(tmp_path)]) == 130
     assert "no patient was done; nothing was written." in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
 def test_an_upper_bound_keeps_its_patients(stopped_at, tmp_path, capsys):
-    stopped_at("agents.evaluation.upper_bound.tried_on", 2)
+    stopped_at("agents.evaluation.search.upper_bound.tried_on", 2)
     out = tmp_path / "bound.csv"
     assert main(["upper-bound", "--patients", "3", "--population", "stroke_mild", "--out", str(out)]) == 130
     lines = (tmp_path / "bound.partial.csv").read_text().splitlines()
@@ -113,7 +113,7 @@ def test_a_search_keeps_its_tries(monkeypatch, tmp_path, capsys):
         progress(Try(name, {"x": 1.0}, {"return": 2.0}))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("agents.commands.tune_baselines.tune", search)
+    monkeypatch.setattr("agents.commands.search.tune_baselines.tune", search)
     assert main(["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]) == 130
     (part,) = tmp_path.iterdir()
     assert part.name == "baselines_tries.partial.csv" and part.read_text().endswith(",2,x=1\n")
@@ -123,7 +123,7 @@ def test_a_search_keeps_its_tries(monkeypatch, tmp_path, capsys):
 def test_a_film_is_whole_or_not_there(stopped_at, tmp_path, capsys):
     pytest.importorskip("imageio")
     pytest.importorskip("pygame")
-    stopped_at("agents.commands.video.band", 3)
+    stopped_at("agents.commands.pictures.video.band", 3)
     assert main(["video", "--policy", "none", "--out", str(tmp_path / "film.gif")]) == 130
     assert "2 of " in (said := capsys.readouterr().err) and "nothing was written" in said
     assert list(tmp_path.iterdir()) == []

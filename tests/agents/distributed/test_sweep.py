@@ -17,8 +17,8 @@ from agents.__main__ import main
 from agents.commands.options import sharing_out
 from agents.distributed.cluster import share_out
 from agents.distributed.shared_evaluation import shared_out
-from agents.evaluation.evaluate import Plan, evaluate
-from agents.evaluation.tuning import tune
+from agents.evaluation.comparison.evaluate import Plan, evaluate
+from agents.evaluation.search.tuning import tune
 from agents.policies.baselines import policy
 from dms_core.errors import DmsError, InputError
 from tests.agents.tiny import config_file
@@ -79,7 +79,7 @@ def test_evaluation_is_that_of_one_process(monkeypatch):
 def test_sweep_survives_a_killed_worker_and_gives_what_trainings_give(tmp_path):
     pytest.importorskip("sb3_contrib")
     from agents.policies.learned import find_policy
-    from agents.training.run_folder import read_record
+    from agents.training.files.run_folder import read_record
 
     path = config_file(tmp_path, n_timesteps=512, training={"eval_every": 256, "save_every": 32})
     command = [sys.executable, "-m", "agents", "sweep", "--configs", path, "--seeds", "3", "5", "--cpus", "2"]

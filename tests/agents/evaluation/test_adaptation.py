@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from agents.__main__ import main
-from agents.evaluation.adaptation import (
+from agents.evaluation.comparison.evaluate import Plan
+from agents.evaluation.episodes.episode import episode, world_of
+from agents.evaluation.studies.adaptation import (
     adaptation,
     best_of,
     hindsight_set,
@@ -17,8 +19,6 @@ from agents.evaluation.adaptation import (
     window_returns,
     windows_of,
 )
-from agents.evaluation.episode import episode, world_of
-from agents.evaluation.evaluate import Plan
 from agents.policies.baselines import policy
 from agents.policies.policy import Policy
 from dms_core.errors import InputError
@@ -119,7 +119,7 @@ def short(monkeypatch):
     def plan(*given):
         return Plan(*given, SHORT)
 
-    monkeypatch.setattr("agents.commands.adaptation.Plan", plan)
+    monkeypatch.setattr("agents.commands.studies.adaptation.Plan", plan)
 
 
 def test_the_command(short, tmp_path, capsys):

@@ -11,12 +11,12 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import patient_seeds
-from agents.evaluation.batch_trials import batch_returns
-from agents.evaluation.episode import judged, world_of
-from agents.evaluation.hindsight import hindsight, place, summed_up, tried_numbers, tuned_difference
-from agents.evaluation.opponents import RETURNS
-from agents.evaluation.tries import EXACT, KeptTries, Try, beside, read_table, table
-from agents.evaluation.tuning import STREAM, tunable, tune
+from agents.evaluation.comparison.opponents import RETURNS
+from agents.evaluation.episodes.episode import judged, world_of
+from agents.evaluation.search.batch_trials import batch_returns
+from agents.evaluation.search.hindsight import hindsight, place, summed_up, tried_numbers, tuned_difference
+from agents.evaluation.search.tries import EXACT, KeptTries, Try, beside, read_table, table
+from agents.evaluation.search.tuning import STREAM, tunable, tune
 from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.tuned import HIDDEN_INTENT, Range
 from dms_core.config_files import configs
@@ -104,8 +104,8 @@ def test_the_command_writes_numbers_and_returns_of_all(tmp_path, monkeypatch, ca
         asked.append(name)
         return tune(name, *given, **more, **SHORT)
 
-    monkeypatch.setattr("agents.commands.tune_baselines.tune", seen)
-    monkeypatch.setattr("agents.commands.tune_baselines.untuned", lambda *given, **more: {"none": 12.5})
+    monkeypatch.setattr("agents.commands.search.tune_baselines.tune", seen)
+    monkeypatch.setattr("agents.commands.search.tune_baselines.untuned", lambda *given, **more: {"none": 12.5})
     command = ["tune-baselines", "--env", HIDDEN, "--tries", "2", "--patients", "1", "--out", str(tmp_path)]
     assert main(command) == 0
     written = read_yaml(tmp_path / "hidden_intent.yml")
@@ -129,8 +129,8 @@ def test_the_command_goes_on_after_a_stop(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
         return tune(name, *given, known=known, **more, **SHORT)
 
-    monkeypatch.setattr("agents.commands.tune_baselines.tune", stopped)
-    monkeypatch.setattr("agents.commands.tune_baselines.untuned", lambda *given, **more: {"none": 0.0})
+    monkeypatch.setattr("agents.commands.search.tune_baselines.tune", stopped)
+    monkeypatch.setattr("agents.commands.search.tune_baselines.untuned", lambda *given, **more: {"none": 0.0})
     command = ["tune-baselines", "--env", HIDDEN, "--tries", "2", "--patients", "1", "--out", str(tmp_path)]
     assert main(command) == 130
     assert "2 of 20 tries are in" in (said := capsys.readouterr().err) and "goes on" in said
@@ -203,7 +203,9 @@ def test_hindsight_begins_with_the_tuned_numbers_and_is_never_below_them():
 
 
 def test_the_hindsight_command_writes_a_row_a_policy_and_patient(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("agents.commands.hindsight.tried", lambda *given, **more: hindsight(*given, **more, **SHORT))
+    monkeypatch.setattr(
+        "agents.commands.search.hindsight.tried", lambda *given, **more: hindsight(*given, **more, **SHORT)
+    )
     out = tmp_path / "hindsight.csv"
     assert main(["hindsight", "--patients", "2", "--tries", "2", "--out", str(out)]) == 0
     assert "mean_clock - mean_angle, tuned, patient by patient:" in capsys.readouterr().out

@@ -9,11 +9,11 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import patient_seeds
-from agents.evaluation.by_patient import by_patient
-from agents.evaluation.evaluate import evaluate
-from agents.evaluation.measures import MEASURES
-from agents.evaluation.statistics import interquartile_mean
-from agents.evaluation.tables import short_table, whole_table
+from agents.evaluation.comparison.by_patient import by_patient
+from agents.evaluation.comparison.evaluate import evaluate
+from agents.evaluation.comparison.statistics import interquartile_mean
+from agents.evaluation.episodes.measures import MEASURES
+from agents.evaluation.results.tables import short_table, whole_table
 from agents.policies.baselines import FOLLOWING, POLICIES, policy
 from agents.policies.learned import LearnedPolicy, find_policy, repetitions_of, shipped_policies
 from dms_core.errors import InputError

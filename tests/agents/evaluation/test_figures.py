@@ -5,12 +5,12 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from agents.evaluation import figure as evaluation_figure
-from agents.evaluation import patients_figure, report_figures
-from agents.evaluation.evaluate import evaluate
-from agents.evaluation.measures import MEASURES
-from agents.evaluation.report_figures import Group, learning_curves
-from agents.evaluation.time_course import TimeCourse, time_course
+from agents.evaluation.comparison.evaluate import evaluate
+from agents.evaluation.episodes.measures import MEASURES
+from agents.evaluation.episodes.time_course import TimeCourse, time_course
+from agents.evaluation.figures import figure as evaluation_figure
+from agents.evaluation.figures import patients_figure, report_figures
+from agents.evaluation.figures.report_figures import Group, learning_curves
 from agents.policies.baselines import policy
 
 TIMES = np.linspace(0.0, 4.0, 201)

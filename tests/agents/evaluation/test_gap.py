@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from agents.__main__ import main
-from agents.evaluation.evaluate import VERSION, evaluate
-from agents.evaluation.evaluation_file import read_evaluation
-from agents.evaluation.gap import GAP, gap_closed, pooled_gap
-from agents.evaluation.opponents import opponent_of, oracle_name, sensors, training_returns, with_opponents
-from agents.evaluation.pooling import pooled
-from agents.evaluation.tables import gap_lines, short_table, whole_table
+from agents.evaluation.comparison.evaluate import VERSION, evaluate
+from agents.evaluation.comparison.gap import GAP, gap_closed, pooled_gap
+from agents.evaluation.comparison.opponents import opponent_of, oracle_name, sensors, training_returns, with_opponents
+from agents.evaluation.comparison.pooling import pooled
+from agents.evaluation.results.evaluation_file import read_evaluation
+from agents.evaluation.results.tables import gap_lines, short_table, whole_table
 from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.learned import Description, LearnedPolicy, find_policy
 from agents.policies.policy import Policy

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from agents.__main__ import main
-from agents.evaluation import kept_shares
-from agents.evaluation.evaluate import Plan
-from agents.evaluation.kept_shares import KeptShares, Planned, digest
+from agents.evaluation.comparison.evaluate import Plan
+from agents.evaluation.sharing import kept_shares
+from agents.evaluation.sharing.kept_shares import KeptShares, Planned, digest
 from agents.policies.baselines import policy
 from agents.policies.reference_free.gravity import Gravity
 
@@ -95,7 +95,7 @@ def test_a_share_of_anything_else_has_another_digest():
 
 
 def test_ctrl_c_says_what_is_kept(monkeypatch, tmp_path, capsys):
-    from agents.evaluation import shift
+    from agents.evaluation.studies import shift
 
     known, calls = kept_shares.KeptShares.add, []
 

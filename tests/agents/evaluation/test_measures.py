@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from agents.environment import ENVIRONMENT, make
-from agents.evaluation.episode import episode
-from agents.evaluation.measures import (
+from agents.evaluation.episodes.episode import episode
+from agents.evaluation.episodes.measures import (
     READ,
     REPETITIONS,
     TENSION,
@@ -20,7 +20,7 @@ from agents.evaluation.measures import (
 )
 from agents.policies.policy import Policy
 from dms_core.config_files import configs
-from exo_env.tasks.repetition import Repetition
+from exo_env.tasks.movements.repetition import Repetition
 
 FREQUENCY = 100.0
 ROPES = ("agonist_tension", "antagonist_tension", "helper_tension")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from agents.__main__ import main
-from agents.evaluation.evaluate import evaluate
-from agents.evaluation.measures import MEASURES
-from agents.evaluation.tables import left_out_lines, short_table, whole_table
+from agents.evaluation.comparison.evaluate import evaluate
+from agents.evaluation.episodes.measures import MEASURES
+from agents.evaluation.results.tables import left_out_lines, short_table, whole_table
 from agents.policies.baselines import policy
 from tests.agents import other_environments  # noqa: F401
 from tests.agents.tiny import config_file
@@ -84,7 +84,7 @@ def test_devices_that_are_none_are_named(text, said, tmp_path, capsys):
 def test_a_training_in_another_environment(tmp_path):
     pytest.importorskip("sb3_contrib")
     from agents.policies.learned import find_policy
-    from agents.training.run_folder import read_record
+    from agents.training.files.run_folder import read_record
 
     path, out = config_file(tmp_path), tmp_path / "run"
     path.write_text(
@@ -108,12 +108,12 @@ def test_actions_of_another_length_are_refused(tmp_path, capsys):
 
 
 def test_films_and_tuning_take_an_environment_and_a_device():
-    from agents.commands.video import Stage
-    from agents.evaluation.tuning import tune
+    from agents.commands.pictures.video import Stage
+    from agents.evaluation.search.tuning import tune
 
     pytest.importorskip("pygame")
     stage = Stage(policy("pid"), "stroke_mild", 0, "tests/Light-v2", exoskeleton={"hinge_damping": 0.5})
-    assert stage.info["load"] == 0.6
+    assert stage.playing.drawn["load"] == 0.6
     stage.env.close()
     settings = {"episode_duration": 0.2, "exoskeleton": {"hinge_damping": 0.5}}
     tried = tune("pid_yielding", 2, 1, 0, environment=BLIND, **settings)

@@ -9,15 +9,15 @@ import pytest
 from gymnasium.envs.registration import register, registry
 
 from agents.environment import ENVIRONMENT, make, make_vector
-from agents.evaluation.episode import judged, movement_of
-from agents.evaluation.evaluate import evaluate
-from agents.evaluation.tables import left_out_lines
-from agents.evaluation.upper_bound import tried_on
+from agents.evaluation.comparison.evaluate import evaluate
+from agents.evaluation.episodes.episode import judged, movement_of
+from agents.evaluation.results.tables import left_out_lines
+from agents.evaluation.search.upper_bound import tried_on
 from agents.policies.baselines import policy
 from dms_core.config_files import configs
 from dms_core.errors import InputError
-from exo_env.tasks.movement import Stay
-from exo_env.tasks.repetition import Repetitions
+from exo_env.tasks.movements.movement import Stay
+from exo_env.tasks.movements.repetition import Repetitions
 
 HOLD, SWAY = "tests/HoldAtSixty-v0", "tests/Sway-v0"
 SHORT = {"episode_duration": 0.4}

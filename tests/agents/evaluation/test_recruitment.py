@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from agents.environment import ENVIRONMENT, make
-from agents.evaluation.recruitment import most_added, most_recruited, powers, recruited
+from agents.evaluation.search.recruitment import most_added, most_recruited, powers, recruited
+from exo_env.patient.excitation.slacking import advance_effort
 from exo_env.patient.patient import Patient
-from exo_env.patient.slacking import advance_effort
 
 PERIOD = 0.02
 PATIENT = Patient(slacking_rate=0.4, effort_recovery=1.5, least_effort=0.2, effort_at_start=0.7, feedback_gain=0.3)

@@ -6,8 +6,8 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import check_settings, make
-from agents.evaluation.evaluate import Plan
-from agents.evaluation.shift import SHIFTS
+from agents.evaluation.comparison.evaluate import Plan
+from agents.evaluation.studies.shift import SHIFTS
 from agents.policies.baselines import policy
 from agents.policies.policy import Policy
 from exo_env.patient.population import Population

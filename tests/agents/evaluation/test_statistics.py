@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from agents.evaluation.statistics import estimate, interquartile_mean, mean
+from agents.evaluation.comparison.statistics import estimate, interquartile_mean, mean
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 7, 8, 20, 101])

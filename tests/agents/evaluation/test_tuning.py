@@ -8,7 +8,7 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import ENVIRONMENT, make, patient_seeds
-from agents.evaluation.tuning import POPULATION, STREAM, trial, tunable, tune
+from agents.evaluation.search.tuning import POPULATION, STREAM, trial, tunable, tune
 from agents.policies.assist_as_needed import AssistAsNeeded
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.lagging_pid import LaggingPid
@@ -82,7 +82,7 @@ def test_mistakes_are_named(arguments, said):
 def test_command_writes_what_the_policies_read(tmp_path, capsys, monkeypatch):
     signature = inspect.signature(tune)
     assert list(signature.parameters)[:4] == ["policy", "tries", "patients", "seed"]
-    monkeypatch.setattr("agents.commands.tune_baselines.tune", lambda *a, **given: tune(*a, **given, **SHORT))
+    monkeypatch.setattr("agents.commands.search.tune_baselines.tune", lambda *a, **given: tune(*a, **given, **SHORT))
     assert main(["tune-baselines", "--tries", "2", "--patients", "1", "--out", str(tmp_path)]) == 0
     assert "pid_yielding" in capsys.readouterr().out
     written = read_yaml(tmp_path / "baselines.yml")
@@ -100,7 +100,7 @@ def test_command_tunes_on_the_population_that_is_named(tmp_path, monkeypatch):
         asked.append(more["population"])
         return tune(*given, **more, **SHORT)
 
-    monkeypatch.setattr("agents.commands.tune_baselines.tune", seen)
+    monkeypatch.setattr("agents.commands.search.tune_baselines.tune", seen)
     command = ["tune-baselines", "--tries", "2", "--patients", "1", "--population", "wide", "--out", str(tmp_path)]
     assert main(command) == 0
     assert asked == ["wide"] * len(tunable())

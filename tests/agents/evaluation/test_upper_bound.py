@@ -4,10 +4,10 @@ import csv
 
 import pytest
 
-from agents.commands.upper_bound import upper_bound
+from agents.commands.search.upper_bound import upper_bound
 from agents.environment import patient_seeds
-from agents.evaluation import upper_bound as tried
-from agents.evaluation.episode import episode, world_of
+from agents.evaluation.episodes.episode import episode, world_of
+from agents.evaluation.search import upper_bound as tried
 from agents.policies.baselines import policy
 
 KEPT = ("ability", "pid_return", "pid_share", "pid_rms_deg", "least_share", "linear_share", "best_return")

@@ -15,8 +15,8 @@ from agents.environment import ENVIRONMENT, make
 from agents.policies.learned import Description, LearnedPolicy, find_policy, world_facts
 from agents.policies.network import ACTIVATIONS, Architecture, Network
 from agents.policies.safetensors import from_bytes, to_bytes
-from agents.training.config import Config
-from agents.training.run_folder import RunFolder
+from agents.training.files.run_folder import RunFolder
+from agents.training.settings.config import Config
 from dms_core.errors import DmsError, InputError
 from tests.agents.tiny import config_file, content
 
@@ -28,7 +28,7 @@ PARITY = 1e-6
 def trained(tmp_path_factory):
     """Models trained a little, with their policies in numpy."""
     pytest.importorskip("sb3_contrib")
-    from agents.evaluation.episode import judged
+    from agents.evaluation.episodes.episode import judged
     from agents.training.run import TrainingRun
 
     found = {}
@@ -110,7 +110,7 @@ def test_onnx_acts_as_numpy(algorithm, changes, trained, tmp_path):
 @pytest.mark.parametrize("name", ACTIVATIONS)
 def test_activations_are_those_of_pytorch(name):
     torch = pytest.importorskip("torch")
-    from agents.training.algorithms import activation
+    from agents.training.learners.algorithms import activation
 
     x = np.linspace(-30.0, 30.0, 201)
     # Both in double precision: round-off only.
@@ -154,7 +154,7 @@ def test_folder_is_evaluated_like_a_baseline(tmp_path, capsys):
 
 def test_evaluation_of_a_run_is_that_of_its_training(trained):
     # The best policy, on the patient that the training set aside, gives the return that the training wrote down.
-    from agents.evaluation.episode import episode
+    from agents.evaluation.episodes.episode import episode
 
     run = trained("ppo")
     policy = find_policy(str(run.folder.path))
@@ -200,7 +200,7 @@ def test_a_run_without_checkpoint_is_named(tmp_path, capsys):
 
 
 def test_what_lacks_a_package_says_how_to_install_it(tmp_path, capsys, monkeypatch):
-    from agents.commands.video import _possible
+    from agents.commands.pictures.video import _possible
     from agents.distributed.cluster import _started
     from agents.export.onnx_file import write_onnx
 
@@ -330,7 +330,7 @@ def test_unknown_policies_are_named(tmp_path):
         with pytest.raises(InputError, match=said):
             find_policy(name)
     with pytest.raises(InputError, match="neither"):
-        main_export = __import__("agents.commands.export", fromlist=["export"]).export
+        main_export = __import__("agents.commands.training.export", fromlist=["export"]).export
         main_export(tmp_path, tmp_path / "out")
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents.environment import ENVIRONMENT, make
-from agents.evaluation.evaluate import evaluate
+from agents.evaluation.comparison.evaluate import evaluate
 from agents.policies.assist_as_needed import AssistAsNeeded, gaussians
 from agents.policies.baselines import FOLLOWING, policy
 from agents.policies.compensation import ANGLES, CompensatedPid, holding_tensions

@@ -7,15 +7,15 @@ import pytest
 
 from agents.__main__ import main
 from agents.environment import ENVIRONMENT, make
-from agents.evaluation.evaluate import evaluate
+from agents.evaluation.comparison.evaluate import evaluate
 from agents.policies.assist_as_needed import AssistAsNeeded
 from agents.policies.learned import Description, LearnedPolicy, find_policy, world_facts
 from agents.policies.network import Architecture
 from agents.policies.policy import Channels
 from dms_core.errors import InputError
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.channels import Channel
 from exo_env.tasks.lift import LiftTask
+from exo_env.tasks.observation.channels import Channel
 from tests.agents.tiny import config_file
 
 TWO = ("device.angle", "privileged.load")

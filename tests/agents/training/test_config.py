@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from agents.environment import ENVIRONMENT, check_settings
-from agents.training.config import Config
-from agents.training.rl_zoo_text import read_call, write_call
+from agents.training.settings.config import Config
+from agents.training.settings.rl_zoo_text import read_call, write_call
 from dms_core.config_files import configs
 from dms_core.errors import InputError
 from dms_core.files.yaml_text import yaml_of
@@ -21,7 +21,7 @@ SHIPPED = sorted((configs() / "agents").rglob("*.yml"))
 
 def refused(said, algorithm="ppo", overrides=(), **changes):
     pytest.importorskip("stable_baselines3")
-    from agents.training.algorithms import arguments
+    from agents.training.learners.algorithms import arguments
 
     with pytest.raises(InputError) as caught:
         arguments(Config.of(content(algorithm, **changes), algorithm, overrides))
@@ -31,7 +31,7 @@ def refused(said, algorithm="ppo", overrides=(), **changes):
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda p: str(p.relative_to(configs())))
 def test_shipped_files_are_accepted(path):
     pytest.importorskip("sb3_contrib")
-    from agents.training.algorithms import arguments
+    from agents.training.learners.algorithms import arguments
 
     config = Config.read(path)
     assert set(config.arguments) == set(arguments(config))
@@ -40,7 +40,7 @@ def test_shipped_files_are_accepted(path):
 
 def test_there_is_a_file_for_every_algorithm():
     pytest.importorskip("sb3_contrib")
-    from agents.training.algorithms import ALGORITHMS
+    from agents.training.learners.algorithms import ALGORITHMS
 
     assert {Config.read(p).training.algorithm for p in SHIPPED} == set(ALGORITHMS)
 
@@ -149,7 +149,7 @@ def test_every_key_is_among_those_allowed(key):
 @pytest.mark.parametrize("gamma", [0, 0.0, 1, 1.0])
 def test_ends_of_a_range_belong_to_it(gamma):
     pytest.importorskip("stable_baselines3")
-    from agents.training.algorithms import arguments
+    from agents.training.learners.algorithms import arguments
 
     assert arguments(Config.of(content(gamma=gamma), "ppo"))["gamma"] == gamma
 

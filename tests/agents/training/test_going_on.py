@@ -13,9 +13,9 @@ import yaml
 pytest.importorskip("sb3_contrib")
 
 from agents.__main__ import main
-from agents.training.fixed_values import MAY_CHANGE
-from agents.training.records import seal
-from agents.training.run_folder import RunFolder, read_record
+from agents.training.files.records import seal
+from agents.training.files.run_folder import RunFolder, read_record
+from agents.training.settings.fixed_values import MAY_CHANGE
 from tests.agents.tiny import config_file
 
 ROOT = Path(__file__).parents[3]
@@ -228,7 +228,7 @@ def test_what_is_no_training_gets_no_lock(tmp_path):
 
 def test_a_sweep_goes_on_by_the_same_rules(run):
     from agents.distributed.sweep import train_share
-    from agents.training.config import Config
+    from agents.training.settings.config import Config
     from dms_core.errors import InputError
 
     file = run / "config.yml"

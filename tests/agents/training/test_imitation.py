@@ -12,13 +12,13 @@ from agents.checkpoint import Store
 from agents.distributed.sweep import in_order, planned
 from agents.environment import ENVIRONMENT, make, make_vector
 from agents.policies.learned import LearnedPolicy, find_policy
-from agents.training.algorithms import arguments, build
-from agents.training.config import Config
-from agents.training.dagger import Dagger
-from agents.training.demonstrations import Demonstrations
-from agents.training.initial import initial_policy
-from agents.training.teacher import Teacher
+from agents.training.learners.algorithms import arguments, build
+from agents.training.learners.dagger import Dagger
+from agents.training.learners.demonstrations import Demonstrations
+from agents.training.networks.initial import initial_policy
+from agents.training.settings.config import Config
 from agents.training.worlds import wrapped
+from agents.training.wrappers.teacher import Teacher
 from dms_core.errors import InputError
 from tests.agents.tiny import ENV_KWARGS, config_file, content
 
@@ -106,7 +106,7 @@ def test_the_student_learns_what_the_teacher_says(tmp_path):
 
 def test_a_student_acts_as_its_exported_form(teacher, tmp_path):
     config = Config.read(student(tmp_path, teacher))
-    from agents.training.extraction import Origin, extract
+    from agents.training.networks.extraction import Origin, extract
 
     worlds = wrapped(config, 3)
     model = build(config, worlds, 3)
@@ -144,7 +144,7 @@ def test_decisions_behind_an_episode_do_not_count():
 
 def fit_losses(layer, seen, advice, counted):
     """Losses of Dagger's fit with a layer in place of a policy."""
-    from agents.training.imitation import Imitation
+    from agents.training.settings.imitation import Imitation
 
     class Student(Dagger):
         def __init__(self):

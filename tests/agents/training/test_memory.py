@@ -9,7 +9,7 @@ from gymnasium import spaces
 
 from agents.__main__ import main
 from agents.policies.network import Architecture, Network
-from agents.training.config import Config
+from agents.training.settings.config import Config
 from dms_core.errors import InputError
 from tests.agents.tiny import config_file, content
 
@@ -18,7 +18,7 @@ pytest.importorskip("sb3_contrib")
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents.environment import ENVIRONMENT, make_sb3_worlds
-from agents.training.critic import actor_size, seen_places
+from agents.training.learners.critic import actor_size, seen_places
 from agents.training.worlds import observed_settings, wrapped
 from agents.training.wrappers.action_repeat import ActionRepeat
 from agents.training.wrappers.low_pass import LowPassObservations, kept_shares
@@ -104,9 +104,9 @@ def test_rewards_of_a_held_action_stop_at_the_end_of_an_episode():
 
 
 def test_the_policy_acts_as_in_pytorch_whatever_its_critic_saw(tmp_path):
-    from agents.evaluation.episode import judged
+    from agents.evaluation.episodes.episode import judged
+    from agents.training.files.run_folder import RunFolder
     from agents.training.run import TrainingRun
-    from agents.training.run_folder import RunFolder
 
     folder, config = RunFolder(tmp_path / "run"), Config.of(content("ppo", SLOW), "ppo")
     folder.begin(config, 0)

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from agents.environment import ENVIRONMENT, make
-from agents.training.config import Config
+from agents.training.settings.config import Config
 from dms_core.config_files import configs
 from dms_core.errors import InputError
 from exo_env.envs.with_settings import WithSettings

@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("sb3_contrib")
 
-from agents.training.algorithms import SQUASHED, arguments, build
-from agents.training.config import Config
-from agents.training.rl_zoo_text import read_call
+from agents.training.learners.algorithms import SQUASHED, arguments, build
+from agents.training.settings.config import Config
+from agents.training.settings.rl_zoo_text import read_call
 from agents.training.worlds import wrapped
 from dms_core.errors import InputError
 from tests.agents.tiny import SECTIONS, content

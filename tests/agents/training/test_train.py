@@ -16,7 +16,7 @@ pytest.importorskip("sb3_contrib")
 
 from agents.__main__ import main
 from agents.policies.learned import LearnedPolicy, find_policy
-from agents.training.run_folder import RunFolder, read_record
+from agents.training.files.run_folder import RunFolder, read_record
 from tests.agents.tiny import config_file
 
 ROOT = Path(__file__).parents[3]
@@ -81,9 +81,9 @@ def test_going_on_is_exact_where_it_can_be(algorithm, tmp_path):
 def test_state_comes_back_to_the_last_bit(algorithm, tmp_path):
     import torch
 
-    from agents.training.algorithms import build
-    from agents.training.config import Config
-    from agents.training.model_state import load_state, save_state
+    from agents.training.files.model_state import load_state, save_state
+    from agents.training.learners.algorithms import build
+    from agents.training.settings.config import Config
     from agents.training.worlds import wrapped
 
     config = Config.read(config_file(tmp_path, algorithm))
@@ -198,9 +198,9 @@ def test_corrupt_files_are_named(file, tmp_path, capsys):
 
 
 def test_loaders_name_files_that_pass_the_hash_but_do_not_fit(tmp_path):
-    from agents.training.algorithms import build
-    from agents.training.config import Config
-    from agents.training.model_state import load_state
+    from agents.training.files.model_state import load_state
+    from agents.training.learners.algorithms import build
+    from agents.training.settings.config import Config
     from agents.training.worlds import wrapped
     from dms_core.errors import InputError
 

@@ -13,7 +13,7 @@ from dms_core.errors import InputError
 from exo_env.ecosystem.arm import ELBOW_STOP, Arm
 from exo_env.ecosystem.person import MASS_0, Person
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.limits import Limits
+from exo_env.tasks.judgement.limits import Limits
 
 LIMP = {"maximum_activation_flexors": 0.0, "maximum_activation_extensors": 0.0}
 HEAVY, LIGHT = {"body_mass": 250.0, "height": 2.3}, {"body_mass": 20.0, "height": 1.0, "sex": "female"}

@@ -11,7 +11,7 @@ from exo_env.drives.impedance import Impedance
 from exo_env.drives.pid_setpoint import PidSetpoint
 from exo_env.drives.rope_tension import RopeTension
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.rewards import Weights
+from exo_env.tasks.judgement.rewards import Weights
 
 PAGE = inspect.getdoc(ElbowLiftEnv)
 

@@ -7,7 +7,14 @@ import math
 import numpy as np
 
 from exo_env.ecosystem.arm import Arm
-from exo_env.patient.effort import PRESENT, EffortState, new_effort, reset_effort, start_excitation, step_effort
+from exo_env.patient.excitation.effort import (
+    PRESENT,
+    EffortState,
+    new_effort,
+    reset_effort,
+    start_excitation,
+    step_effort,
+)
 from exo_env.patient.patient import MIDDLE, PATIENT, Patient
 
 MUSCLES, SIGN = Arm().muscles, Arm().signs

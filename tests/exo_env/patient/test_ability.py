@@ -11,9 +11,9 @@ from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.envs.hidden_intent import HiddenIntentEnv
 from exo_env.patient.ability import SMALLEST_SCALE, Need, ability, lacking_when, put_lacking, voluntary
-from exo_env.patient.motor_command import InternalModel, plan_course
+from exo_env.patient.excitation.motor_command import InternalModel, plan_course
 from exo_env.patient.patient import MIDDLE, Patient
-from exo_env.tasks.repetition import Repetition
+from exo_env.tasks.movements.repetition import Repetition
 
 DEVICE = Exoskeleton.from_config("exoskeletons/elbow.yaml")
 TIMES = np.linspace(0.0, 6.0, 301)

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.patient.effort import new_effort, reset_effort, step_effort
-from exo_env.patient.fatigue import REST, L, advance_fatigue
+from exo_env.patient.excitation.effort import new_effort, reset_effort, step_effort
+from exo_env.patient.excitation.fatigue import REST, L, advance_fatigue
+from exo_env.patient.excitation.slacking import MOST_EFFORT, advance_effort
 from exo_env.patient.patient import LONGEST_DELAY, MIDDLE, Patient
-from exo_env.patient.slacking import MOST_EFFORT, advance_effort
 from tests.exo_env.patient.at_work import MUSCLES, SIGN, AtWork
 
 PERIOD = 0.02

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.patient.effort import TICK
-from exo_env.patient.forward_model import FORGETTING, LIMB, advance_limb
+from exo_env.patient.excitation.effort import TICK
+from exo_env.patient.excitation.forward_model import FORGETTING, LIMB, advance_limb
 from exo_env.patient.patient import MIDDLE, Patient
 from tests.exo_env.patient.at_work import SIGN, AtWork
 
@@ -98,8 +98,8 @@ def test_what_a_patient_knows_of_its_limb_is_the_limb_of_the_world():
     assert known[LIMB.lag] == pytest.approx(0.5 * (rise + 2.0 * fall))
     # Forearm and hand alone, and with handle and weight on the rope at 0.3 m or less.
     assert arm.inertia_about_elbow() < known[LIMB.inertia] < arm.inertia_about_elbow() + 2.0 * 0.3**2
-    from exo_env.patient.motor_command import arm_table
-    from exo_env.patient.static_optimisation import muscle_moment
+    from exo_env.patient.excitation.motor_command import arm_table
+    from exo_env.patient.excitation.static_optimisation import muscle_moment
 
     both = [muscle_moment(arm_table(arm), MIDDLE, np.where(SIGN > 0.0, a, 0.01)) for a in (1.0, 0.01)]
     assert effort.levers[SIGN > 0.0].sum() == pytest.approx(both[0] - both[1], rel=1e-12)

@@ -11,9 +11,9 @@ from exo_env.ecosystem.ecosystem import Ecosystem, Proprioception
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.paper.scenarios import build, load_scenarios
-from exo_env.patient import motor_command
-from exo_env.patient.motor_command import InternalModel, plan, plan_course
-from exo_env.patient.static_optimisation import least_squares
+from exo_env.patient.excitation import motor_command
+from exo_env.patient.excitation.motor_command import InternalModel, plan, plan_course
+from exo_env.patient.excitation.static_optimisation import least_squares
 
 
 @pytest.fixture(scope="module")

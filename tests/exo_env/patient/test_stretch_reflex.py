@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from exo_env.patient.excitation.stretch_reflex import stretch_reflex
 from exo_env.patient.patient import MIDDLE, Patient
-from exo_env.patient.stretch_reflex import stretch_reflex
 from tests.exo_env.patient.at_work import MUSCLES, SIGN, AtWork
 
 SPASTIC = {"spasticity_flexors": 0.3, "spasticity_extensors": 0.1, "stretch_threshold": 0.8}

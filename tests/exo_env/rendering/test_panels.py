@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from dms_core.config_files import configs
-from exo_env.rendering.panels import legend, letter, note, save
+from exo_env.rendering.panels import legend, letter, log_scale, note, save
 
 pytest.importorskip("matplotlib")
 
@@ -71,6 +71,38 @@ def test_several_panels_have_letters_and_one_has_none(tmp_path):
     figure, axes = figure_of(1)
     save(figure, tmp_path / "b.png")
     assert texts(axes[0, 0]) == []
+
+
+def test_no_title_reaches_a_letter_or_the_next_panel(tmp_path):
+    figure, axes = figure_of(3)
+    for ax in axes.flat:
+        ax.set_title("power against the patient, in the mean [W]", fontsize=9)
+    axes[0, 2].set_title("short")
+    save(figure, tmp_path / "a.png")
+    for ax in axes.flat:
+        (beside,) = ax.texts
+        title, box = ax.title.get_window_extent(), ax.get_window_extent()
+        # Half a pixel: places of letters are rounded to whole ones.
+        assert box.x0 - 0.5 <= title.x0 and title.x1 <= box.x1 + 0.5
+        assert not title.overlaps(beside.get_window_extent())
+    assert axes[0, 0].get_title().replace("\n", " ") == "power against the patient, in the mean [W]"
+    assert axes[0, 2].get_title() == "short"
+
+
+@pytest.mark.parametrize("values", [(4.0, 8.0), (1.7, 9.0), (2.0, 80.0), (0.3, 60.0), (0.01, 900.0)])
+def test_labels_of_a_logarithmic_axis_are_plain_and_apart(values, tmp_path):
+    figure, axes = figure_of(2)
+    ax = axes[0, 0]
+    ax.clear()
+    ax.plot(values, [0, 1])
+    log_scale(ax, "x")
+    save(figure, tmp_path / "a.png")
+    low, high = ax.get_xlim()
+    ticks = [t for t in ax.xaxis.get_major_ticks() if low <= t.get_loc() <= high]
+    boxes = sorted((t.label1.get_window_extent() for t in ticks), key=lambda box: box.x0)
+    assert len(boxes) > 1 and all(one.x1 < other.x0 for one, other in zip(boxes, boxes[1:], strict=False))
+    assert [float(t.label1.get_text()) for t in ticks] == pytest.approx([t.get_loc() for t in ticks])
+    assert not any(t.label1.get_text() for t in ax.xaxis.get_minor_ticks())
 
 
 def test_a_legend_names_the_lines_of_all_panels_once():

@@ -12,10 +12,10 @@ from exo_env.drives.rope_tension import RopeTension
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.kernels import FIRST_EVENT, SOLVER, compiled, first_of, readings
 from exo_env.tables import STATUS
-from exo_env.tasks.channels import Channel, Parts, Reading
 from exo_env.tasks.elbow import elbow_readings, read_elbow
 from exo_env.tasks.lift import LiftTask
-from exo_env.tasks.movement import Stay
+from exo_env.tasks.movements.movement import Stay
+from exo_env.tasks.observation.channels import Channel, Parts, Reading
 from exo_env.tasks.task import Reported
 
 PARTS = Parts(("flexor",), ("agonist", "antagonist"), ("agonist tension", "antagonist tension"))

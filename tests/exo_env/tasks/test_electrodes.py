@@ -6,7 +6,7 @@ import pytest
 from dms_core.errors import InputError
 from exo_env.envs.hidden_intent import HiddenIntentEnv
 from exo_env.patient.distributions import Draws
-from exo_env.tasks.electrodes import FAULTS, Electrodes, electrode_draws, put_envelopes
+from exo_env.tasks.observation.electrodes import FAULTS, Electrodes, electrode_draws, put_envelopes
 
 ACTIVATIONS = np.array([0.6, 0.3, 0.0])
 

@@ -5,7 +5,7 @@ import pytest
 
 from dms_core.errors import InputError
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.rewards import Weights
+from exo_env.tasks.judgement.rewards import Weights
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import pytest
 from dms_core.errors import InputError
 from exo_env.envs.hidden_intent import HiddenIntentEnv, NewPatientEnv
 from exo_env.tables import STATUS
-from exo_env.tasks.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
-from exo_env.tasks.rewards import TERM
-from exo_env.world.control_period import observe, read
+from exo_env.tasks.judgement.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
+from exo_env.tasks.judgement.rewards import TERM
+from exo_env.world.kernels.control_period import observe, read
 
 NOTHING = np.array([0.0, -1.0])
 

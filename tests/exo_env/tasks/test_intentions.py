@@ -7,10 +7,10 @@ import pytest
 
 from dms_core.errors import InputError
 from exo_env.envs.hidden_intent import TIME, HiddenIntentEnv
-from exo_env.tasks.intended_plan import Move, Plan
-from exo_env.tasks.intentions import MOST_TARGETS, Intentions
-from exo_env.tasks.repetition import HIGHEST, LOWEST
-from exo_env.tasks.submovements import UNIT
+from exo_env.tasks.movements.intended_plan import Move, Plan
+from exo_env.tasks.movements.intentions import MOST_TARGETS, Intentions
+from exo_env.tasks.movements.repetition import HIGHEST, LOWEST
+from exo_env.tasks.movements.submovements import UNIT
 
 KEYS = [np.uint64(k) for k in range(400)]
 

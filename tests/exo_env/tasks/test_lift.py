@@ -7,7 +7,7 @@ import pytest
 
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.tasks.elbow import device_share
-from exo_env.tasks.rewards import TERM, Weights, term_values
+from exo_env.tasks.judgement.rewards import TERM, Weights, term_values
 
 LIMP = {"maximum_activation_flexors": 0.0, "maximum_activation_extensors": 0.0}
 HOLD = np.array([-1.0, -1.0])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.channels import Channel, Imperfection, Parts, first_places
 from exo_env.tasks.lift import LiftTask
-from exo_env.tasks.noise import IMPERFECTION, imperfect
-from exo_env.tasks.observer import Observer
-from exo_env.tasks.repetition import Repetition
+from exo_env.tasks.movements.repetition import Repetition
+from exo_env.tasks.observation.channels import Channel, Imperfection, Parts, first_places
+from exo_env.tasks.observation.noise import IMPERFECTION, imperfect
+from exo_env.tasks.observation.observer import Observer
 
 
 def _part(env, observation, name):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.tasks.repetition import Repetition
+from exo_env.tasks.movements.repetition import Repetition
 
 
 def test_repetition_reaches_its_angles():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.evaluation.evaluate import evaluate
+from agents.evaluation.comparison.evaluate import evaluate
 from agents.policies.baselines import NoAssistance, PidControl
 from agents.policies.lagging_pid import LaggingPid
 from agents.policies.policy import Policy

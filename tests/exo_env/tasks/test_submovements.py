@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from exo_env.tasks.course import course_of
-from exo_env.tasks.submovements import put_sum
+from exo_env.tasks.movements.course import course_of
+from exo_env.tasks.movements.submovements import put_sum
 
 UNITS = np.array([[0.5, 1.2, 40.0], [1.1, 1.5, -25.0], [3.0, 0.8, 10.0], [0.0, 1.0, 0.0]])
 

@@ -10,16 +10,16 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError, SimulationError
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.patient.distributions import Draws, distribution
-from exo_env.patient.effort import TICK
-from exo_env.patient.motor_command import SETTLED, InternalModel, plan_course
+from exo_env.patient.excitation.effort import TICK
+from exo_env.patient.excitation.motor_command import SETTLED, InternalModel, plan_course
 from exo_env.patient.patient import PATIENT, Patient, fields_of
 from exo_env.patient.population import Population, population
 from exo_env.streams import stream, uniform
 from exo_env.tables import OUTCOME
-from exo_env.tasks.repetition import Repetition, Repetitions, put_pieces
+from exo_env.tasks.movements.repetition import Repetition, Repetitions, put_pieces
 from exo_env.traits import neutral_traits
-from exo_env.world.reset import GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED
-from exo_env.world.rest_pose import MOVING
+from exo_env.world.kernels.reset import GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED
+from exo_env.world.kernels.rest_pose import MOVING
 from exo_env.world.work_sharing import areas_of, claim
 from exo_env.world.world import PLANNING
 

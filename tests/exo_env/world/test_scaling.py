@@ -11,9 +11,9 @@ from exo_env.ecosystem.gym_machine import ROPE
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.patient.patient import Patient
 from exo_env.patient.population import population
-from exo_env.tasks.repetition import Repetition
-from exo_env.world import scaling
-from exo_env.world.scaling import SIZES, Numbers, Scaling, declared, monomials, numbers_of, scaling_of, template
+from exo_env.tasks.movements.repetition import Repetition
+from exo_env.world.kernels import scaling
+from exo_env.world.kernels.scaling import SIZES, Numbers, Scaling, declared, monomials, numbers_of, scaling_of, template
 
 DRIVES = ElbowLiftEnv.drives
 MODES = tuple(DRIVES)

@@ -6,9 +6,9 @@ import pytest
 from dms_core.kernels import MATRIX_SINGULAR
 from exo_env.envs import base_env
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.patient.effort import TICK
+from exo_env.patient.excitation.effort import TICK
 from exo_env.tables import STATUS
-from exo_env.world.control_period import SAME_TIME, set_commands, set_excitations
+from exo_env.world.kernels.control_period import SAME_TIME, set_commands, set_excitations
 
 HELD = np.array([-0.7, -0.8])
 COMMON = 0.2

@@ -8,7 +8,7 @@ import pytest
 from dms_core import Model, World
 from dms_core.errors import InputError
 from exo_env.envs.elbow_lift import ElbowLiftEnv
-from exo_env.world.scaling import declared
+from exo_env.world.kernels.scaling import declared
 
 NUMBERS = [
     ("TRIlat", "pennation_angle"),

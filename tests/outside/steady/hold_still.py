@@ -19,9 +19,9 @@ from exo_env.kernels import (
     terms_of,
 )
 from exo_env.settings import Settings
-from exo_env.tasks.channels import Channel, Reading
 from exo_env.tasks.elbow import ELBOW, action_channel, device_channels, elbow_readings, read_elbow
-from exo_env.tasks.movement import Movement, Stay
+from exo_env.tasks.movements.movement import Movement, Stay
+from exo_env.tasks.observation.channels import Channel, Reading
 from exo_env.tasks.task import Reported, Task
 
 

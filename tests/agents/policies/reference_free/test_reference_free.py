@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from agents.environment import make, make_vector
-from agents.evaluation.fair_play import begin
-from agents.evaluation.tuning import numbers_at
+from agents.evaluation.episodes.fair_play import begin
+from agents.evaluation.search.tuning import numbers_at
 from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.reference_free.assist_moment import Seen
 from agents.policies.reference_free.emg_proportional import EmgProportional

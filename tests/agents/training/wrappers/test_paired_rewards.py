@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents.environment import ENVIRONMENT, make, make_vector
-from agents.training.config import Config
+from agents.training.settings.config import Config
 from agents.training.worlds import training_worlds
 from dms_core.errors import InputError
 from tests.agents.tiny import content

@@ -1,0 +1,1 @@
+"""Commands that show: a picture, a film, a report."""

@@ -1,0 +1,1 @@
+"""Commands that train, once or many times, and give a trained policy away."""

@@ -1,0 +1,1 @@
+"""What an evaluation leaves: its file, and tables of it."""

@@ -1,0 +1,1 @@
+"""How a patient's intention becomes excitations: command, prediction, effort, fatigue, slacking, stretch reflex."""

@@ -1,0 +1,1 @@
+"""What an episode is worth and what ends it: reward terms, and limits of anatomy and safety."""

@@ -1,0 +1,1 @@
+"""What an agent is shown: readings, channels, and how sensors and electrodes spoil them."""
