@@ -25,18 +25,11 @@ from exo_env.tasks.elbow import (
     read_elbow,
 )
 from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
-<<<<<<< HEAD
-from exo_env.tasks.electrodes import Electrodes, electrode_draws, put_envelopes
-from exo_env.tasks.intent_rewards import INTENT_TERM, INTENT_WIDTH, IntentWeights, opposing_power, opposition
-from exo_env.tasks.intentions import Intentions
-from exo_env.tasks.movement import Movement
-=======
-from exo_env.tasks.judgement.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
+from exo_env.tasks.judgement.intent_rewards import INTENT_TERM, INTENT_WIDTH, IntentWeights, opposing_power, opposition
 from exo_env.tasks.movements.intentions import Intentions
 from exo_env.tasks.movements.movement import Movement
 from exo_env.tasks.observation.channels import Channel, Imperfection, Parts, Reading
 from exo_env.tasks.observation.electrodes import Electrodes, electrode_draws, put_envelopes
->>>>>>> main
 from exo_env.tasks.task import Reported, first_of, readings, step_of, terms_of
 
 EPISODES_RENEWED = 0.1

@@ -11,12 +11,13 @@ For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activ
           + sign tremor_amplitude sin(phase)                                               tremor
     u_k = delayed(d_k, electromechanical delay), within 0.01 to 1
 
-s is the effort (slacking.py), A the activity of who holds, M_F the fatigued share (fatigue.py), y^ the error with its lead, which is felt late and
-predicted from there to now (forward_model.py). Weakness is a ceiling, since what was measured after stroke is the
-largest torque: who is weak wants a larger share of what is left for the same moment, and gives it up to all of it. That
-patients know their weakness so well is assumed; the rest of it they learn by their errors (s above 1). Weakness is of
-the descending command: reflex and tremor know no ceiling. Tremor alternates between the groups and its phase wanders
-with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of that width at half height.
+s is the effort (slacking.py), A the activity of who holds, M_F the fatigued share (fatigue.py), y^ the error with its
+lead, which is felt late and predicted from there to now (forward_model.py). Weakness is a ceiling, since what was
+measured after stroke is the largest torque: who is weak wants a larger share of what is left for the same moment, and
+gives it up to all of it. That patients know their weakness so well is assumed; the rest of it they learn by their
+errors (s above 1). Weakness is of the descending command: reflex and tremor know no ceiling. Tremor alternates between
+the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of
+that width at half height.
 
 A patient acts every TICK, whatever the control rate of the device is: 50 times a second, which few motor units of the
 biceps exceed in the strongest contractions (31 +- 10 Hz, Bellemare et al. 1983, J. Neurophysiol. 50:1380-1392), so that
@@ -143,7 +144,8 @@ def feedback(par, state, planned_rate, period):
         # What the model expects is known at the end of the period.
         then = delayed(state.expected, 0, newest, max(delay / period, 1.0))
         error -= share * (state.expected[0, newest] - then)
-    return (par[PATIENT.feedback_gain] + par[PATIENT.feedback_scaling] * activity(par, state, planned_rate, period)) * error
+    more = par[PATIENT.feedback_scaling] * activity(par, state, planned_rate, period)
+    return (par[PATIENT.feedback_gain] + more) * error
 
 
 @compiled
