@@ -136,7 +136,7 @@ class Patient(Person):
     )  # fmt: skip
     feedback_scaling: float = trait(
         0.0, ge=0.0, le=50.0, unit="1/rad", acts="effort", neutral=True,
-        description="further gain per activity: that of the reflex rises with the motor discharge that there is "
+        description="further gain per activity [1/rad]: that of the reflex rises with the motor discharge there is "
         "[Matthews 1986], and the stiffness of an elbow that holds with its torque [Gomi 1998]; after stroke assumed",
     )  # fmt: skip
     feedback_delay: float = trait(
