@@ -135,8 +135,9 @@ def dump(system: System) -> str:
         InputError: an input is a Python function, which no file can hold.
     """
     content: dict[str, Any] = {"name": system.name}
+    companions = system.companions
     for section in BRANCHES:
-        declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm)]
+        declared = [e for e in getattr(system, section) if not isinstance(e, EulerNorm) and e.name not in companions]
         if declared:
             content[section] = [_plain(e) for e in declared]
     return yaml_of(content, default_flow_style=None, allow_unicode=True)

@@ -10,7 +10,9 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from dms_core.model.constraints.couplings.linear_coupling import JointTerm
 from dms_core.model.element import Declaration
+from dms_core.model.forces import BushingCurves, LoadCurve
 from dms_core.model.muscles import ThelenCurves
 from dms_core.model.ropes import PathPoint
 from dms_core.model.signals import Function, Signal
@@ -50,12 +52,12 @@ component with its unit at the end of the name.
 
 INTRODUCTIONS = {
     "bodies": "What has mass.",
-    "constraints": "Equations between bodies: joints, guides, ropes of fixed length, drivers.",
+    "constraints": "Equations between bodies: joints, guides, couplings, ropes of fixed length, drivers.",
     "forces": "Loads, springs, ropes, muscles, controllers, differential equations.",
     "sensors": "What is measured.",
     "inputs": "Courses in time u(t), named by the elements that follow them. `kind: input` may be left out.",
 }
-PARTS = (PathPoint, ThelenCurves)
+PARTS = (BushingCurves, JointTerm, LoadCurve, PathPoint, ThelenCurves)
 """Mappings inside declarations."""
 
 

@@ -103,11 +103,11 @@ def reaction_partials(constraints, sensors, e, w, c, by_q, by_lam):
         )
     if frame >= 0:
         moment = sub(ground_moment(q, o, r, 3), cross(arm, force))
-        _frame_partials(w, n, frame, row, force, moment, iq[first : first + n], by_q)
+        frame_partials(w, n, frame, row, force, moment, iq[first : first + n], by_q)
 
 
 @compiled
-def _frame_partials(w, n, frame, row, force, moment, columns, by_q):
+def frame_partials(w, n, frame, row, force, moment, columns, by_q):
     """Add what the turning of the frame itself contributes."""
     Yq, q = matrix(w, WORK.G), floats(w, WORK.q_l)
     for i in range(3):

@@ -22,7 +22,7 @@ from dms_core.compiled.arena import Packed, matrix
 from dms_core.compiled.calls import call_entry
 from dms_core.compiled.entries import SLOPES, Slopes, derivative_addresses
 from dms_core.compiled.jit import compiled
-from dms_core.model.element import INPUT_DERIVATIVE, MOMENT
+from dms_core.model.element import COMPOSITIONS, INPUT_DERIVATIVE, MOMENT
 
 STEP = float(np.finfo(float).eps) ** (1.0 / 3.0)
 """Difference step over the size of what is changed, 6e-6: truncation and rounding of a central difference are then both
@@ -163,8 +163,28 @@ class InputDerivatives:
         q = self._sensing.work.values.q
         for sensor, sources in self._moments:
             for e in sources:
-                np.add.at(y[sensor.row], layout.dynamics[e].iu, -self._moment(sensor, layout.dynamics[e], e, q))
+                call = layout.dynamics[e]
+                if sensor.element.composition == COMPOSITIONS.force_load:  # type: ignore[union-attr]
+                    for k, load in enumerate(np.moveaxis(self._load(sensor, call, e, q), 1, 0)):
+                        y[sensor.row : sensor.row + 6, call.iu[k]] -= load
+                else:
+                    np.add.at(y[sensor.row], call.iu, -self._moment(sensor, call, e, q))
         return y
+
+    def _load(self, sensor: Call, call: Call, e: int, q: np.ndarray) -> np.ndarray:
+        """Force and moment of the columns of Ju on the sensor's body, in its frame, shape (6, k, 3)."""
+        own, frame = q[sensor.iq[:7]], sensor.placement.integers[0]
+        arm, total = _turned(own[3:], np.array(sensor.placement.numbers)), np.zeros((6, len(call.iu), 3))
+        axes = (
+            np.eye(3) if frame < 0 else np.array([_turned(q[sensor.iq[frame + 3 : frame + 7]], x) for x in np.eye(3)])
+        )
+        Ju = self._of_call(e)
+        for o in range(0, 7 * len(call.placement.bodies), 7):
+            if call.iq[o] == sensor.iq[0]:
+                load = np.moveaxis(Ju[o : o + 7], 0, -1)
+                force, moment = load[..., :3], _ground_moment(own, load) - np.cross(arm, load[..., :3])
+                total += np.concatenate([np.moveaxis(x @ axes.T, -1, 0) for x in (force, moment)])
+        return total
 
     def _moment(self, sensor: Call, call: Call, e: int, q: np.ndarray) -> np.ndarray:
         """Moment about the sensor's axis of the columns of Ju on its distal bodies, shape (k, 3)."""
@@ -175,10 +195,14 @@ class InputDerivatives:
         for o in range(0, 7 * len(call.placement.bodies), 7):
             if call.iq[o] in sensor.iq[7::7]:
                 own, load = q[call.iq[o : o + 7]], np.moveaxis(Ju[o : o + 7], 0, -1)
-                e0, ev, rest = own[3], own[4:], load[..., 4:]
-                turn = 0.5 * (-load[..., 3:4] * ev + e0 * rest + np.cross(ev, rest))
-                total += (np.cross(own[:3] - centre, load[..., :3]) + turn) @ axis
+                total += (np.cross(own[:3] - centre, load[..., :3]) + _ground_moment(own, load)) @ axis
         return total
+
+
+def _ground_moment(own: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """E(p) Q_p / 2 of generalised loads (..., 7) on a body with the coordinates `own`, shape (..., 3)."""
+    e0, ev, rest = own[3], own[4:], load[..., 4:]
+    return 0.5 * (-load[..., 3:4] * ev + e0 * rest + np.cross(ev, rest))
 
 
 def _turned(p: np.ndarray, s: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.assembly.composed_sensors import joint_moment, joint_moment_partials, reaction, reaction_partials
+from dms_core.assembly.force_loads import force_load, force_load_partials
 from dms_core.assembly.layout import Layout
 from dms_core.assembly.local import evaluate_sensor, views
 from dms_core.assembly.residual import evaluate_inputs
@@ -132,6 +133,8 @@ def _evaluate_all(sensing):
             evaluate_sensor(x, sensors, e, first, end, w, 0)
         elif kinds[e] == COMPOSITIONS.reaction:
             reaction(constraints, sensors, e, w, which[e])
+        elif kinds[e] == COMPOSITIONS.force_load:
+            force_load(dynamics, sensors, e, w, _sources(composed, e))
         else:
             joint_moment(dynamics, sensors, e, w, _sources(composed, e))
         for i in range(rows[e + 1] - rows[e]):
@@ -164,6 +167,8 @@ def evaluate_partials(dynamics, constraints, sensors, composed, w, into):
         if kinds[e] != COMPOSITIONS.none:
             if kinds[e] == COMPOSITIONS.reaction:
                 reaction_partials(constraints, sensors, e, w, which[e], by_q, by_lam)
+            elif kinds[e] == COMPOSITIONS.force_load:
+                force_load_partials(dynamics, sensors, e, w, _sources(composed, e), by_q, by_v, by_a)
             else:
                 joint_moment_partials(dynamics, sensors, e, w, _sources(composed, e), by_q, by_v, by_a)
             continue

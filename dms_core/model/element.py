@@ -124,6 +124,9 @@ class Compositions(NamedTuple):
     joint_moment: int = 2
     """Moment of `Placement.sources` on all bodies of the placement but the first. Numbers: centre and axis on the
     first body, see MOMENT."""
+    force_load: int = 3
+    """Load of `Placement.sources` on the first body of the placement. Integers: offset of the body whose axes are used
+    (-1: the ground); numbers: the point, from the centre of mass."""
 
 
 class MomentNumbers(NamedTuple):
@@ -252,6 +255,17 @@ class Constraint(Declaration):
 
     def welded(self) -> tuple[str, ...]:
         """Bodies that this constraint leaves no freedom relative to each other; none unless it is a weld."""
+        return ()
+
+    def governs(self) -> str:
+        """What this constraint determines, in words, where no second one may: "the angle of 'elbow'"; '' for nothing.
+
+        Two of the same words in one system contradict each other or say one thing twice, and are refused.
+        """
+        return ""
+
+    def companions(self) -> tuple[DynamicElement, ...]:
+        """Elements that come with this constraint; the system adds them, and no file lists them."""
         return ()
 
     def place(self, system) -> Placement:

@@ -9,9 +9,12 @@ import numpy as np
 
 from dms_core.errors import ModelError, choices
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.element import GROUND, Body, Constraint, Declaration, Force, Sensor
+from dms_core.model.element import GROUND, Body, Constraint, Declaration, DynamicElement, Force, Sensor
 from dms_core.model.geometry.frames import rotation_matrix
 from dms_core.model.signals import Input
+
+_BRANCHES = (Body, Constraint, Declaration, DynamicElement, Force, Sensor)
+"""Classes of so many kinds that a message names them alone."""
 
 
 class System:
@@ -43,7 +46,9 @@ class System:
         # Those of another system may be among the constraints that were taken over from it.
         declared = tuple(c for c in self._checked("constraints", constraints, Constraint) if c not in norms)
         self.constraints = norms + declared
-        self.forces = self._checked("forces", forces, Force)
+        companions = tuple(e for c in declared for e in c.companions())
+        given = tuple(f for f in self._checked("forces", forces, Force) if f not in companions)
+        self.forces = self._checked("companions of constraints", companions, Force) + given
         self.sensors = self._checked("sensors", sensors, Sensor)
         self.inputs = self._checked("inputs", inputs, Input)
         self._by_name: dict[str, Declaration] = {}
@@ -56,6 +61,25 @@ class System:
                     f"the name '{element.name}' is used by a {first.kind} and a {element.kind}; names must be unique."
                 )
             self._by_name[element.name] = element
+        self._check_governed()
+
+    def _check_governed(self) -> None:
+        """Two constraints that determine the same are an error."""
+        found: dict[str, Constraint] = {}
+        for constraint in self.constraints:
+            what = constraint.governs()
+            first = found.setdefault(what, constraint) if what else constraint
+            if first is not constraint:
+                raise ModelError(
+                    f"{constraint.kind} '{constraint.name}' determines {what}, which {first.kind} '{first.name}' "
+                    "determines already. Remove one of them.",
+                    constraint.name,
+                )
+
+    @property
+    def companions(self) -> frozenset[str]:
+        """Names of the elements that came with constraints."""
+        return frozenset(e.name for c in self.constraints for e in c.companions())
 
     @staticmethod
     def _checked(what: str, items: Any, kind: type) -> tuple:
@@ -68,12 +92,12 @@ class System:
         """All declarations, in the order bodies, constraints, forces, sensors, inputs."""
         yield from (*self.bodies, *self.constraints, *self.forces, *self.sensors, *self.inputs)
 
-    def element(self, name: str, kind: type | None = None) -> Any:
+    def element(self, name: str, kind: type | tuple[type, ...] | None = None) -> Any:
         """The declaration of that name; an unknown name or a wrong kind is an error that lists the right ones."""
         found = self._by_name.get(name)
         wanted = kind or Declaration
         if not isinstance(found, wanted):
-            label = getattr(wanted, "__name__", "element")
+            label = _label(wanted)
             names = [e.name for e in self.everything() if isinstance(e, wanted)]
             problem = "does not exist" if found is None else f"is a {found.kind}"
             raise ModelError(f"'{name}' {problem}. Expected the name of a {label}. Declared: {choices(names)}.")
@@ -111,3 +135,13 @@ class System:
         """A direction of body_i in the frame of body_j, both at their declared start poses."""
         (_, A_i), (_, A_j) = self.start_pose(body_i), self.start_pose(body_j)
         return A_j.T @ (A_i @ np.asarray(direction, float))
+
+
+def _label(wanted: type | tuple[type, ...]) -> str:
+    """Names of classes as a message lists them; those of all kinds of it for one that is itself no kind."""
+    classes: set[Any] = set()
+    for cls in wanted if isinstance(wanted, tuple) else (wanted,):
+        kinds: list[Any] = [cls] if getattr(cls, "kind", "") or cls in _BRANCHES else list(cls.__subclasses__())
+        classes.update(k for k in kinds if getattr(k, "kind", "") or k in _BRANCHES)
+    names = sorted(cls.__name__ for cls in classes)
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"

@@ -19,6 +19,7 @@ from dms_core.model.element import Constraint, Force
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.model.signals import AnySignal
 from exo_env.ecosystem.arm import ELBOW, Arm, excitation_name
+from exo_env.ecosystem.cuff import Cuff
 from exo_env.ecosystem.exoskeleton import DEFAULT as DEFAULT_DEVICE
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine, LoadedMachine
@@ -66,12 +67,15 @@ class Ecosystem(Settings):
     )
     weight: float = Field(default=1.0, gt=0.0, description="mass of the weight [kg]")
     guide: GuideKind = Field(default="plane", description="guide between lower link and forearm: 1, 2 or 5 rows")
+    cuff: Cuff | None = Field(default=None, description="compliant cuff in place of the guide; None: the guide")
     misalignment: Misalignment = Misalignment()
     proprioception: Proprioception = Proprioception()
 
     @model_validator(mode="after")
     def _free_elbow(self) -> Self:
         """A line or prismatic guide leaves an elbow free only if its axis is that of the hinge."""
+        if self.guide != "plane" and self.cuff is not None:
+            raise ValueError(f"guide '{self.guide}' and a cuff are both given; expected one of them")
         if self.guide != "plane" and self.misalignment != Misalignment():
             raise ValueError(
                 f"guide '{self.guide}' with a misaligned device locks the elbow; the one-row guide 'plane' lets it move"
@@ -84,7 +88,7 @@ class Ecosystem(Settings):
 
     def worn(self) -> WornExoskeleton:
         """The device on this arm."""
-        return WornExoskeleton(self.device, self.arm(), self.misalignment, self.guide)
+        return WornExoskeleton(self.device, self.arm(), self.misalignment, self.guide, self.cuff)
 
     def more_parts(self, arm: Arm, worn: WornExoskeleton) -> Sequence[Part]:
         """Parts beside arm, device and machine: none here; an ecosystem of one's own gives them.
@@ -141,8 +145,11 @@ class Ecosystem(Settings):
                 ),
                 *(force for part in beside for force in part.forces()),
                 *arm.forces(),
+                *worn.cushions(),
             ],
-            sensors=sensors(arm.muscles, tuple(self.device.ropes), gym=self.machine is not None),
+            sensors=sensors(
+                arm.muscles, tuple(self.device.ropes), gym=self.machine is not None, compliant=self.cuff is not None
+            ),
             inputs=[
                 Input(name=REFERENCE, signal=reference),
                 *(device_inputs or [Input(name=ASSISTANCE, signal=Constant(value=assistance))]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dms_core.model import Imu, JointAngle, JointMoment, JointReaction, MuscleSensor, RopeSensor, Tracking
+from dms_core.model import ForceLoad, Imu, JointAngle, JointMoment, JointReaction, MuscleSensor, RopeSensor, Tracking
 from dms_core.model.element import Sensor
 from dms_core.model.sensors.muscle import Component
 from exo_env.ecosystem.arm import ELBOW
@@ -28,14 +28,20 @@ def tension_sensor(rope: str) -> str:
     return f"{rope}_tension"
 
 
-def sensors(muscles: tuple[str, ...], ropes: tuple[str, ...], *, gym: bool) -> list[Sensor]:
+def sensors(muscles: tuple[str, ...], ropes: tuple[str, ...], *, gym: bool, compliant: bool = False) -> list[Sensor]:
     """Sensors of a system.
 
     Args:
         muscles: names of the muscles.
         ropes: names of the device's ropes.
         gym: whether the hand holds the handle of a gym machine.
+        compliant: whether a compliant cuff, and no guide, holds the forearm.
     """
+    load_on_forearm = (
+        ForceLoad(name="guide_force", force=GUIDE, body="forearm")
+        if compliant
+        else JointReaction(name="guide_force", constraint=GUIDE, body="forearm")
+    )
     gym_rope = [RopeSensor(name="gym_rope_tension", rope=ROPE, components=("tension",))] if gym else []
     return [
         JointAngle(name="elbow_angle", joint=ELBOW),
@@ -47,6 +53,6 @@ def sensors(muscles: tuple[str, ...], ropes: tuple[str, ...], *, gym: bool) -> l
         JointMoment(name="muscle_moment", joint=ELBOW, elements=muscles, bodies=("forearm",)),
         JointMoment(name="exo_moment", joint=HINGE, elements=ropes, bodies=(LOWER,)),
         JointReaction(name="elbow_reaction", constraint=ELBOW, body="forearm"),
-        JointReaction(name="guide_force", constraint=GUIDE, body="forearm"),
+        load_on_forearm,
         Imu(name=FOREARM_IMU, body="forearm", point=WRIST),
     ]

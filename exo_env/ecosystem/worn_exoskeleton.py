@@ -24,6 +24,7 @@ from dms_core.model import (
 from dms_core.model.element import Constraint, Force, Vector
 from dms_core.model.geometry.frames import euler_parameters, quaternion, quaternion_product, rotation_matrix
 from exo_env.ecosystem.arm import Arm
+from exo_env.ecosystem.cuff import Cuff
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.settings import Settings
 
@@ -75,10 +76,18 @@ class WornExoskeleton:
         arm: arm whose humerus carries it.
         misalignment: how the device is worn.
         guide: 'plane' (one row), 'line' (two) or 'slider' (five).
+        cuff: compliant cuff in place of the guide; None: none.
     """
 
-    def __init__(self, device: Exoskeleton, arm: Arm, misalignment: Misalignment, guide: GuideKind = "plane") -> None:
-        self.device, self.arm, self.guide_kind = device, arm, guide
+    def __init__(
+        self,
+        device: Exoskeleton,
+        arm: Arm,
+        misalignment: Misalignment,
+        guide: GuideKind = "plane",
+        cuff: Cuff | None = None,
+    ) -> None:
+        self.device, self.arm, self.guide_kind, self.cuff = device, arm, guide, cuff
         axes = link_axes(arm)
         about_x, about_y = (math.radians(x) for x in misalignment.tilt_deg)
         tilt = quaternion_product(quaternion((1, 0, 0), about_x), quaternion((0, 1, 0), about_y))
@@ -122,13 +131,20 @@ class WornExoskeleton:
         ]
 
     def joints(self) -> list[Constraint]:
-        """Upper link fixed to the humerus, hinge, guide."""
+        """Upper link fixed to the humerus, hinge, and the guide where there is no compliant cuff."""
         on_humerus = tuple(self.origin - self.arm.segments["humerus"].origin)
         return [
             Fixed(name="cuff", body_i="humerus", body_j=UPPER, point_i=on_humerus),
             Revolute(name=HINGE, body_i=UPPER, body_j=LOWER, point_j=(0.0, 0.0, 0.0), axis_j=(0.0, 0.0, 1.0)),
-            self._guide(),
+            *([] if self.cuff else [self._guide()]),
         ]
+
+    def cushions(self) -> list[Force]:
+        """The compliant cuff, under the name of the guide that it replaces; none where the guide is rigid."""
+        if self.cuff is None:
+            return []
+        at, orientation = (0.0, -self.device.guide_distance, 0.0), euler_parameters(self.axes)
+        return [self.cuff.bushing(GUIDE, LOWER, at, "forearm", self.guided_point, orientation)]
 
     def _guide(self) -> Constraint:
         """Lower link and a point of the forearm on its long axis, seen across the elbow axis."""

@@ -46,6 +46,7 @@ from exo_env.envs.settings import (
     load_distribution,
     owned,
     whole_periods,
+    worn_cuff,
     worn_device,
     worn_misalignment,
 )
@@ -123,7 +124,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
         """Arm, device and machine of the settings."""
         return self.ecosystem_type(
             device=worn_device(settings.exoskeleton), subject=read_subject(settings.subject),
-            misalignment=worn_misalignment(settings.misalignment),
+            misalignment=worn_misalignment(settings.misalignment), cuff=worn_cuff(settings.cuff),
         )  # fmt: skip
 
     def made_task(self, settings: EnvSettings, parts: Parts) -> Task:

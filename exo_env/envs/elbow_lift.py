@@ -133,6 +133,7 @@ class ElbowLiftEnv(AssistanceEnv):
     | `load`             | `None`           | weight [kg], or a distribution; `None`: 0.5 to 2                         |
     | `exoskeleton`      | `None`           | device by name or YAML file, or changes of the default one               |
     | `misalignment`     | `None`           | `shift` [x, y, z] m of the hinge, `tilt_deg` [about x, then y]           |
+    | `cuff`             | `None`           | `"compliant"`, or `stiffness` and `damping` of it; `None`: a rigid guide |
     | `subject`          | `"arm26"`        | anatomy by name or YAML file                                             |
     | `reference`        | `None`           | distributions of start_deg, amplitude_deg, rest, duration, pause         |
     | `action_mode`      | `"rope_tension"` | or `"pid_setpoint"`, `"assist_moment"`, `"impedance"`                    |

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dms_core.errors import InputError, choices
+from exo_env.ecosystem.cuff import Cuff
 from exo_env.ecosystem.exoskeleton import DEFAULT as DEFAULT_DEVICE
 from exo_env.ecosystem.exoskeleton import Exoskeleton, shipped_devices
 from exo_env.ecosystem.subject import DEFAULT
@@ -46,6 +47,7 @@ class EnvSettings(Settings):
     load: Any = Field(default=None, description="weight [kg], or a distribution")
     exoskeleton: Any = Field(default=None, description="device by name or YAML file, or changes of the default one")
     misalignment: Any = Field(default=None, description="how the device is worn: shift [m] and tilt_deg of the hinge")
+    cuff: Any = Field(default=None, description="'compliant', or its stiffness and damping; None: a rigid guide")
     subject: str = Field(default=DEFAULT, description="anatomy by name or YAML file")
     reference: Any = Field(default=None, description="changes of the movement's distributions")
     action_mode: str = Field(default="rope_tension", description="drive, by name")
@@ -206,3 +208,18 @@ def worn_misalignment(source: Any) -> Misalignment:
     if not (source is None or isinstance(source, Mapping)):
         raise InputError(f"misalignment = {source!r}: expected a mapping with some of shift, tilt_deg, or None.")
     return Misalignment(**(source or {}))
+
+
+def worn_cuff(source: Any) -> Cuff | None:
+    """The compliant cuff, None for the rigid guide.
+
+    Raises:
+        InputError: it is neither None, 'compliant' nor a mapping with some of `stiffness` and `damping`.
+    """
+    if source is None:
+        return None
+    if not (source == "compliant" or isinstance(source, Mapping)):
+        raise InputError(
+            f"cuff = {source!r}: expected None, 'compliant', or a mapping with some of stiffness, damping."
+        )
+    return Cuff(**(source if isinstance(source, Mapping) else {}))

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dms_core.model.constraints import (
     AngleDriver,
+    Cylindrical,
     Distance,
     EulerNorm,
     Fixed,
     LineGuide,
+    Planar,
     PlaneGuide,
     PositionDriver,
     Revolute,
+    Screw,
     Slider,
     Spherical,
+    Universal,
 )
 from dms_core.model.element import Constraint
 from tests.example_elements import Example
@@ -90,6 +94,27 @@ def position() -> Example:
     )
 
 
+def sleeve() -> Example:
+    """Axis along no coordinate axis."""
+    return _joint(Cylindrical(name="sleeve", axis_i=(1.0, 0.5, -0.3), point_j=(0.0, -0.2, 0.1), **PAIR))
+
+
+def table() -> Example:
+    """A tilted plane, and a normal of the second body that is given."""
+    own = {"point_j": (0.0, -0.2, 0.1), "axis_j": (0.1, 0.2, 1.0)}
+    return _joint(Planar(name="table", axis_i=(1.0, 0.5, -0.3), **own, **PAIR))
+
+
+def nut() -> Example:
+    """A left-handed thread."""
+    return _joint(Screw(name="nut", axis_i=(1.0, 0.5, -0.3), point_j=(0.0, -0.2, 0.1), lead=-0.8, **PAIR))
+
+
+def cross() -> Example:
+    """Arms along no coordinate axes."""
+    return _joint(Universal(name="cross", axis_i=(1.0, 0.5, -0.3), axis_j=(0.1, 1.0, 0.2), **PAIR))
+
+
 EXAMPLES = {
     "euler_norm": (norm,),
     "revolute": (hinge,),
@@ -101,4 +126,8 @@ EXAMPLES = {
     "distance": (rod, rod_between_centres),
     "angle_driver": (angle,),
     "position_driver": (position,),
+    "cylindrical": (sleeve,),
+    "planar": (table,),
+    "screw": (nut,),
+    "universal": (cross,),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.control.actuator import RopeActuator
 from dms_core.model.control.delayed_error import DelayedError
 from dms_core.model.control.impedance import ImpedanceController

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dms_core.model.element import Force
 from dms_core.model.forces import (
+    Bushing,
+    BushingCurves,
     FirstOrder,
     Gravity,
+    JointMotor,
     JointSpringDamper,
     JointStop,
+    LoadCurve,
     LumpedLoad,
     SecondOrder,
     SpringDamper,
+    TorsionSpring,
+    TurnCounter,
 )
 from tests.example_elements import Example
 from tests.example_elements.constraints import HINGE
@@ -94,7 +100,59 @@ def free_oscillator() -> Example:
     return _force(SecondOrder(name="mode", stiffness=50.0))
 
 
+CUSHION = {
+    "body_i": "upper", "body_j": "lower", "point_i": (0.03, -0.3, 0.05), "orientation_i": (0.9, 0.3, -0.2, 0.1),
+    "orientation_j": (0.8, -0.1, 0.5, 0.2),
+}  # fmt: skip
+
+
+def cushion() -> Example:
+    """Six stiffnesses and dampings, frames along no axes."""
+    return _force(
+        Bushing(
+            name="cushion",
+            stiffness=(200.0, 300.0, 150.0, 4.0, 7.0, 5.0),
+            damping=(3.0, 2.0, 4.0, 0.2, 0.1, 0.3),
+            **CUSHION,
+        )
+    )
+
+
+def cushion_with_curves() -> Example:
+    """A force and a moment by table, no damping, undeformed at the start: the tighter pattern."""
+    force = LoadCurve(deflections=(-1.5, -0.4, 0.0, 0.3, 1.6), loads=(-900.0, -40.0, 0.0, 30.0, 1200.0))
+    moment = LoadCurve(deflections=(-0.5, 0.0, 1.5), loads=(-6.0, 0.0, 40.0))
+    curves = BushingCurves(y=force, turn_z=moment)
+    stiffness = (200.0, 0.0, 150.0, 4.0, 7.0, 0.0)
+    return _force(Bushing(name="cushion", body_i="upper", body_j="lower", stiffness=stiffness, curves=curves))
+
+
+def wound_spring() -> Example:
+    """A curve of several turns, with damping."""
+    curve = LoadCurve(deflections=(-20.0, -2.0, 0.0, 5.0, 30.0), loads=(-60.0, -3.0, 0.0, 9.0, 80.0))
+    return _force(TorsionSpring(name="spring", joint="hinge", curve=curve, damping=0.4, rest_angle=-9.0))
+
+
+def straight_wound_spring() -> Example:
+    """A stiffness, no damping: the tighter pattern."""
+    return _force(TorsionSpring(name="spring", joint="hinge", stiffness=3.0, pointer_i=(1.0, 0.2, 0.0)))
+
+
+def counter() -> Example:
+    """Of the hinge."""
+    return _force(TurnCounter(name="turns", joint="hinge"))
+
+
+def motor() -> Example:
+    """A moment on the hinge."""
+    return _force(JointMotor(name="motor", joint="hinge", input="moment"), "moment")
+
+
 EXAMPLES = {
+    "bushing": (cushion, cushion_with_curves),
+    "joint_motor": (motor,),
+    "torsion_spring": (wound_spring, straight_wound_spring),
+    "turn_counter": (counter,),
     "gravity": (gravity,),
     "lumped_load": (load, following_load, pure_moment),
     "spring_damper": (spring, undamped_spring),

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from exo_env.ecosystem.cuff import DAMPING, STIFFNESS
 from exo_env.patient.between import between
 from exo_env.patient.population import Population
 from exo_env.tasks.elbow import action_channel
@@ -60,6 +61,12 @@ def _tilt(plan: Plan, policy: Policy, degrees: float) -> Plan:
     return _with(plan, misalignment={"tilt_deg": [degrees, 0.0]})
 
 
+def _cuff(plan: Plan, policy: Policy, times: float) -> Plan:
+    """A compliant cuff in place of the rigid guide, some times as compliant as a measured one."""
+    stiffness, damping = [x / times for x in STIFFNESS], [x / math.sqrt(times) for x in DAMPING]
+    return _with(plan, cuff={"stiffness": stiffness, "damping": damping})
+
+
 def _noise(plan: Plan, policy: Policy, factor: float) -> Plan:
     """White noise and quanta are larger."""
     return _faulty(plan, policy, lambda i: i.changed(deviation=factor * i.deviation, quantum=factor * i.quantum))
@@ -104,6 +111,7 @@ def _load(plan: Plan, policy: Policy, kilograms: float) -> Plan:
 SHIFTS: Mapping[str, Shift] = {
     "hinge_offset": Shift("distance of the hinge from the elbow [mm]", (0.0, 10.0, 20.0, 30.0, 40.0), _offset),
     "hinge_tilt": Shift("tilt of the hinge's axis [deg]", (0.0, 5.0, 10.0, 15.0, 20.0), _tilt),
+    "cuff": Shift("compliance of the cuff, over a measured one; 0: rigid [-]", (0.0, 0.5, 1.0, 2.0, 4.0), _cuff),
     "sensor_noise": Shift("noise of the sensors, over that of training [-]", (1.0, 2.0, 4.0, 8.0, 16.0), _noise),
     "sensor_delay": Shift("delay of the sensors beyond training [ms]", (0.0, 20.0, 40.0, 80.0, 160.0), _delay),
     "electrode_faults": Shift(

@@ -80,11 +80,11 @@ def dot2(k, oi, oj, a, si, sj, q, v, lam, level, phi, G, W, H):
     add_gradient(G, k, oi, q, f, si, -1.0)
     add_gradient(G, k, oj, q, f, sj, 1.0)
     if level > 0:
-        _dot2_second(k, oi, oj, a, si, sj, q, v, lam[k], f, d, W, H)
+        dot2_second(k, oi, oj, a, si, sj, q, v, lam[k], f, d, W, H)
 
 
 @compiled
-def _dot2_second(k, oi, oj, a, si, sj, q, v, lam, f, d, W, H):
+def dot2_second(k, oi, oj, a, si, sj, q, v, lam, f, d, W, H):
     """Second derivatives of dot2."""
     ca = columns(q, oi, a)
     f_t = rotated_rate(q, v, oi, a)

@@ -34,7 +34,7 @@ from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.control.actuator import NOMINAL_TENSION
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
 from dms_core.model.geometry.angle import add_angle_gradient, add_angle_rate_gradient, angle_rate, joint_angle

@@ -13,7 +13,7 @@ from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated
 
 
 @compiled
-def _angle_gradient(f, g, h, q):
+def angle_gradient(f, g, h, q):
     """theta_q by the Euler parameters of both bodies: an 8-tuple."""
     m, _ = angle_directions(0, 7, f, g, h, q)
     x = k_times(rotated(q, 7, h), m, euler_parameters(q, 0))
@@ -24,7 +24,7 @@ def _angle_gradient(f, g, h, q):
 
 
 @compiled
-def _place(i):
+def local_parameter(i):
     """Local coordinate of entry i of the 8-tuple."""
     return 3 + i if i < 4 else 6 + i
 
@@ -35,7 +35,7 @@ def _angle_rate_gradient(f, g, h, q, v, Jq):
     add_angle_rate_gradient(3, 0, 7, f, g, h, q, v, 1.0, Jq)
     w = (Jq[3, 3], Jq[3, 4], Jq[3, 5], Jq[3, 6], Jq[3, 10], Jq[3, 11], Jq[3, 12], Jq[3, 13])
     for i in range(8):
-        Jq[3, _place(i)] = 0.0
+        Jq[3, local_parameter(i)] = 0.0
     return w
 
 
@@ -57,13 +57,13 @@ def put_joint_moment(f, g, h, q, v, M, by_angle, by_rate, level, r, Jq, Jv):
         Jq: their derivatives by q.
         Jv: their derivatives by v.
     """
-    b = _angle_gradient(f, g, h, q)
+    b = angle_gradient(f, g, h, q)
     for i in range(8):
-        r[_place(i)] += M * b[i]
+        r[local_parameter(i)] += M * b[i]
     if level > 0:
         w = _angle_rate_gradient(f, g, h, q, v, Jq)
         add_angle_hessian(0, 7, f, g, h, q, M, Jq)
         for i in range(8):
             for j in range(8):
-                Jq[_place(i), _place(j)] += b[i] * (by_angle * b[j] + by_rate * w[j])
-                Jv[_place(i), _place(j)] += by_rate * b[i] * b[j]
+                Jq[local_parameter(i), local_parameter(j)] += b[i] * (by_angle * b[j] + by_rate * w[j])
+                Jv[local_parameter(i), local_parameter(j)] += by_rate * b[i] * b[j]

@@ -1,4 +1,4 @@
-"""Spring and damper about a revolute joint.
+"""Spring and damper at a joint.
 
     M = k (theta - theta0) + c thetadot,   Q = -M theta_q^T
 
@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.axis_joint import AxisJoint
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.forces.joint_moment import put_joint_moment
 from dms_core.model.geometry.angle import angle_frame, angle_rate, joint_angle
@@ -51,11 +51,11 @@ def joint_spring_damper(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
 
 
 class JointSpringDamper(Force):
-    """Linear torsion spring and damper about a revolute joint. The angle stays within half a turn of the rest angle."""
+    """Linear torsion spring and damper at a joint. The angle stays within half a turn of the rest angle."""
 
     kind: ClassVar[str] = "joint_spring_damper"
     kernel: ClassVar = joint_spring_damper
-    joint: str = Field(description="revolute joint")
+    joint: str = Field(description="joint about an axis")
     stiffness: float = Field(default=0.0, ge=0.0, description="k [N m/rad]")
     damping: float = Field(default=0.0, ge=0.0, description="c [N m s/rad]")
     rest_angle: float = Field(default=0.0, description="theta0, where the spring is slack [rad]")
@@ -64,7 +64,7 @@ class JointSpringDamper(Force):
 
     def place(self, system) -> Placement:
         """Both bodies of the joint and the angle's frame."""
-        joint = system.element(self.joint, Revolute)
+        joint = system.element(self.joint, AxisJoint)
         who = f"joint_spring_damper '{self.name}'"
         frame = angle_frame(system, who, joint, self.pointer_i, self.pointer_j)
         p = np.arange(14) % 7 >= 3

@@ -1,4 +1,4 @@
-"""Stops of a revolute joint: beyond a lowest and a highest angle, the contact of Hunt and Crossley about the angle.
+"""Stops of a joint: beyond a lowest and a highest angle, the contact of Hunt and Crossley about the angle.
 
 With the depth x > 0 beyond a stop, and xdot its rate:
 
@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.axis_joint import AxisJoint
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.forces.joint_moment import put_joint_moment
 from dms_core.model.geometry.angle import angle_frame, angle_rate, joint_angle
@@ -71,11 +71,11 @@ def joint_stop(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
 
 
 class JointStop(Force):
-    """Lowest and highest angle of a revolute joint, each a stop that yields; between them nothing acts."""
+    """Lowest and highest angle of a joint, each a stop that yields; between them nothing acts."""
 
     kind: ClassVar[str] = "joint_stop"
     kernel: ClassVar = joint_stop
-    joint: str = Field(description="revolute joint")
+    joint: str = Field(description="joint about an axis")
     lowest: float = Field(description="angle below which a stop is touched [rad]")
     highest: float = Field(description="angle above which a stop is touched [rad]; less than a turn above the lowest")
     stiffness: float = Field(gt=0.0, description="k of both stops [N m/rad^1.5]")
@@ -96,7 +96,7 @@ class JointStop(Force):
 
     def place(self, system) -> Placement:
         """Both bodies of the joint and the angle's frame."""
-        joint = system.element(self.joint, Revolute)
+        joint = system.element(self.joint, AxisJoint)
         frame = angle_frame(system, f"joint_stop '{self.name}'", joint, self.pointer_i, self.pointer_j)
         p = np.arange(14) % 7 >= 3
         full, none = np.outer(p, p), np.zeros((14, 14), bool)

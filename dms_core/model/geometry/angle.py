@@ -154,3 +154,30 @@ def angle_frame(system, who: str, joint, pointer_i=None, pointer_j=None) -> np.n
             f"along the axis of '{joint.name}' in '{joint.body_j}' and shows no angle; give one across that axis."
         )
     return np.concatenate([f, np.cross(axis, f), h])
+
+
+def start_frame(system, joint, f=None) -> np.ndarray:
+    """f, g, h, shape (9,), of a joint about an axis, with angle 0 at the declared start.
+
+    Args:
+        system: the declared system.
+        joint: with body_i, body_j and axes.
+        f: direction across the axis in body_i; default: any.
+    """
+    axis, axis_j = joint.axes(system)
+    f = perpendicular(axis) if f is None else f
+    h = system.start_direction(joint.body_i, f, joint.body_j)
+    h = h - axis_j * (axis_j @ h)
+    if np.linalg.norm(h) < LEAST_LEVER:
+        raise ModelError(
+            f"{joint.kind} '{joint.name}': axis_i of '{joint.body_i}' and axis_j of '{joint.body_j}' are at right "
+            "angles at the declared start, so that the joint shows no angle there. Expected start poses with both axes "
+            "along each other."
+        )
+    return np.concatenate([f, np.cross(axis, f), h / np.linalg.norm(h)])
+
+
+def start_angle(system, joint, frame: np.ndarray) -> float:
+    """Angle in a frame f, g, h at the declared start [rad], in (-pi, pi]."""
+    d = system.start_direction(joint.body_j, frame[6:], joint.body_i)
+    return math.atan2(frame[3:6] @ d, frame[:3] @ d)

@@ -119,14 +119,15 @@ def joint_angle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
 
 
 class JointAngle(Sensor):
-    """Angle of body_j against body_i of a revolute joint, positive about its axis, in (-pi, pi].
+    """Angle of body_j against body_i of a joint about an axis, positive about its axis, in (-pi, pi].
 
-    Without pointers it is 0 where the reference frames of both bodies are parallel.
+    Without pointers it is 0 where the reference frames of both bodies are parallel. An angle that goes on beyond half a
+    turn is the coordinate of a `turn_counter`.
     """
 
     kind: ClassVar[str] = "joint_angle"
     kernel: ClassVar = joint_angle_sensor
-    joint: str = Field(description="name of the revolute joint")
+    joint: str = Field(description="name of the joint")
     pointer_i: Vector | None = Field(default=None, description="direction of angle 0 in the frame of body_i [-]")
     pointer_j: Vector | None = Field(
         default=None, description="direction in the frame of body_j that lies along pointer_i at angle 0 [-]"

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.element import COMPOSITIONS, MOMENT, DynamicElement, Placement, Sensor
 from dms_core.model.geometry.frames import unit
 from dms_core.model.places import numbers_at

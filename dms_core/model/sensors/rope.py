@@ -14,6 +14,7 @@ from pydantic import Field, field_validator, model_validator
 
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
+from dms_core.model.constraints.couplings.drum_rope import DrumRope
 from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.element import Declaration, Placement, Sensor
 from dms_core.model.geometry.path import (
@@ -76,7 +77,7 @@ class RopeSensor(Sensor):
 
     kind: ClassVar[str] = "rope_sensor"
     kernel: ClassVar = rope_sensor
-    rope: str | None = Field(default=None, description="name of a rope_force or rope_length")
+    rope: str | None = Field(default=None, description="name of a rope_force, rope_length or drum_rope")
     path: tuple[PathPoint, ...] | None = Field(default=None, min_length=2, description="points, instead of a rope")
     components: tuple[Literal["length", "rate", "tension"], ...] = Field(
         default=("length", "rate"), min_length=1, description="what is measured, in this order [m, m/s, N]"
@@ -108,9 +109,10 @@ class RopeSensor(Sensor):
         if isinstance(rope, RopeForce):
             placed = rope.place(system)
             return replace(placed, integers=(*placed.integers, *codes), pattern=None)
-        if rope is not None and not isinstance(rope, RopeLength):
+        if rope is not None and not isinstance(rope, RopeLength | DrumRope):
             raise ModelError(
-                f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}. Expected a rope_force or rope_length."
+                f"rope_sensor '{self.name}': '{self.rope}' is a {rope.kind}. Expected a rope_force, rope_length or "
+                "drum_rope."
             )
         table = path_table(system, rope.path if rope is not None else self.path or ())
         return Placement(

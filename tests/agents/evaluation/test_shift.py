@@ -110,7 +110,7 @@ def test_ray_gives_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--shifts", "wind"], "--shifts wind: expected different ones of electrode_faults"),
+        (["--shifts", "wind"], "--shifts wind: expected different ones of cuff, electrode_faults"),
         (["--shifts", "load", "load"], "--shifts load: expected different ones"),
         (["--env", "exo/ElbowLift-v2"], "expected one whose task hides the patient's plan"),
         (["--patients", "0"], "patients = 0: expected a whole number from 1"),

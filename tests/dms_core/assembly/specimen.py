@@ -10,35 +10,49 @@ from dms_core.assembly.layout import Layout
 from dms_core.assembly.model import Model
 from dms_core.model import (
     AngleDriver,
+    Belt,
+    Bushing,
     Constant,
+    Cylindrical,
     Distance,
+    DrumRope,
     FirstOrder,
     Fixed,
+    Gear,
     Gravity,
     Harmonic,
     Input,
+    JointMotor,
     JointSpringDamper,
     JointStop,
+    JointTerm,
+    LinearCoupling,
     LineGuide,
     LumpedLoad,
     MinimumJerk,
     PathPoint,
     Pid,
+    Planar,
     PlaneGuide,
     PointMass,
     PositionDriver,
+    Rack,
     ReferenceFilter,
     Revolute,
     RigidBody,
     RopeActuator,
     RopeForce,
     RopeLength,
+    Screw,
     SecondOrder,
     Slider,
     Spherical,
     SpringDamper,
     System,
     ThelenMuscle,
+    TorsionSpring,
+    TurnCounter,
+    Universal,
 )
 from dms_core.model.element import Constraint, DynamicElement
 
@@ -61,6 +75,20 @@ BODIES = (
     RigidBody(name="wheel", mass=2.0, inertia=(0.02, 0.02, 0.04), position=(1.0, 0.0, 0.0)),
     RigidBody(name="weight", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(1.5, -1.0, 0.2)),
     RigidBody(name="lift", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(-1.0, 0.0, 0.2)),
+    *(
+        RigidBody(name=name, mass=1.0, inertia=(0.1, 0.12, 0.15), position=place)
+        for name, place in (
+            ("cog", (3.0, 0.0, 0.0)),
+            ("pinion", (3.3, 0.0, 0.0)),
+            ("pulley", (3.6, 0.0, 0.0)),
+            ("rod_of_rack", (3.0, 0.5, 0.0)),
+            ("nut", (4.0, 0.0, 0.0)),
+            ("sleeve", (4.5, 0.0, 0.0)),
+            ("puck", (5.0, 0.0, 0.0)),
+            ("propeller", (4.0, 0.0, 0.5)),
+        )
+    ),
+    PointMass(name="bucket", mass=0.5, position=(3.7, -1.0, 0.0)),
 )
 
 
@@ -90,7 +118,32 @@ CONSTRAINTS: tuple[Constraint, ...] = (
     ),
     Slider(name="shaft", body_j="lift", axis_i=(0.0, 1.0, 0.0)),
     PositionDriver(name="winch", body_j="lift", axis_i=(0.1, 1.0, 0.0), input="height"),
-)
+    Revolute(name="cog_axle", body_j="cog", point_i=(3.0, 0.0, 0.0)),
+    Revolute(name="pinion_axle", body_j="pinion", point_i=(3.3, 0.0, 0.0)),
+    Revolute(name="pulley_axle", body_j="pulley", point_i=(3.6, 0.0, 0.0)),
+    Gear(name="gear", joint_i="cog_axle", joint_j="pinion_axle", ratio=-2.0),
+    Belt(name="belt", joint_i="pinion_axle", joint_j="pulley_axle", radius_i=0.1, radius_j=0.2),
+    Slider(name="bed", body_j="rod_of_rack", axis_i=(1.0, 0.0, 0.0)),
+    Rack(name="rack", pinion="cog_axle", rail="bed", radius=-0.1),
+    Screw(name="spindle", body_j="nut", point_i=(4.0, 0.0, 0.0), lead=0.3),
+    Universal(
+        name="cross", body_i="nut", body_j="propeller", point_i=(0.0, 0.0, 0.2), axis_i=(1.0, 0.0, 0.0),
+        axis_j=(0.0, 1.0, 0.1),
+    ),
+    Cylindrical(name="tube", body_j="sleeve", point_i=(4.5, 0.0, 0.0)),
+    LinearCoupling(
+        name="differential",
+        coordinates=(
+            JointTerm(joint="spindle", factor=0.5),
+            JointTerm(joint="tube", factor=1.0),
+            JointTerm(joint="tube", coordinate="slide", factor=3.0),
+        ),
+    ),
+    Planar(name="table", body_j="puck", axis_i=(0.1, 1.0, 0.2)),
+    DrumRope(
+        name="line", joint="pulley_axle", radius=0.1, path=_path(("ground", (3.7, 0.0, 0.0)), ("bucket", (0.0,) * 3))
+    ),
+)  # fmt: skip
 
 FORCES: tuple[DynamicElement, ...] = (
     Gravity(name="gravity"),
@@ -109,6 +162,17 @@ FORCES: tuple[DynamicElement, ...] = (
     ),
     JointSpringDamper(name="stop", joint="elbow", stiffness=8.0, damping=0.7),
     JointStop(name="end", joint="elbow", lowest=1.0, highest=1.1, stiffness=5.0, dissipation=0.05),
+    Bushing(
+        name="cushion",
+        body_j="puck",
+        point_i=(5.1, 0.0, 0.1),
+        stiffness=(50.0, 60.0, 70.0, 2.0, 3.0, 4.0),
+        damping=(2.0, 1.0, 3.0, 0.2, 0.1, 0.3),
+        orientation_j=(1.0, 0.1, -0.2, 0.1),
+    ),
+    TorsionSpring(name="coil", joint="cog_axle", stiffness=3.0, damping=0.2),
+    JointMotor(name="servo", joint="tube", input="factor"),
+    TurnCounter(name="turns", joint="tube"),
     FirstOrder(name="lag", time_constant=0.1, gain=2.0, input="factor", start=0.4),
     SecondOrder(name="oscillator", mass=2.0, damping=0.3, stiffness=40.0, input="factor", start=0.2, start_rate=0.5),
     RopeForce(
@@ -166,8 +230,8 @@ def scales(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def random_point(model: Model, seed: int) -> Point:
-    """About the start, off the constraints; the fibre shortens, so that no kink of its curves is near."""
-    rng = np.random.default_rng(seed)
+    """About the start, off the constraints; the fibre shortens, and no kink of its curves is near these draws."""
+    rng = np.random.default_rng([seed, 1])
     by_q, by_v = scales(model)
     n = model.n_q
     q = model.start.q + 0.02 * by_q * rng.uniform(-1.0, 1.0, n)

@@ -127,7 +127,7 @@ def test_inputs_are_those_that_were_set(world):
 
 def test_a_point_that_does_not_fit_is_refused(world):
     at = world.operating_point()
-    with pytest.raises(InputError, match=r"expected v of shape \(62,\), got \(3,\)"):
+    with pytest.raises(InputError, match=r"expected v of shape \(126,\), got \(3,\)"):
         world.blocks(at._replace(v=np.zeros(3)))
     u = at.u.copy()
     u[2, 1] = np.nan

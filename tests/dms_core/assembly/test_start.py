@@ -78,10 +78,26 @@ def test_a_start_that_a_driver_moves_is_a_guess():
 
 
 def _driven(first: float, second: float) -> System:
-    """A hinge with two drivers."""
-    drivers = [AngleDriver(name=name, joint="hinge", input=f"{name}_angle") for name in ("lift", "hold")]
+    """A rod on two hinges of one axis, each with a driver."""
+    drivers = [AngleDriver(name=name, joint=f"{name}_hinge", input=f"{name}_angle") for name in ("lift", "hold")]
     inputs = [Input(name=f"{n}_angle", signal=Constant(value=x)) for n, x in (("lift", first), ("hold", second))]
-    return System("arm", bodies=[_rod()], constraints=[Revolute(name="hinge", body_j="rod"), *drivers], inputs=inputs)
+    hinges = [Revolute(name=f"{name}_hinge", body_j="rod") for name in ("lift", "hold")]
+    return System("arm", bodies=[_rod()], constraints=[*hinges, *drivers], inputs=inputs)
+
+
+def test_two_drivers_of_one_joint_are_an_error():
+    drivers = [AngleDriver(name=name, joint="hinge", input="angle") for name in ("lift", "hold")]
+    with pytest.raises(
+        ModelError,
+        match=r"angle_driver 'hold' determines the angle of 'hinge', which angle_driver 'lift' determines already",
+    ):
+        System(bodies=[_rod()], constraints=[Revolute(name="hinge", body_j="rod"), *drivers])
+
+
+def test_two_drivers_of_one_way_are_an_error():
+    drivers = [PositionDriver(name=name, body_j="rod", axis_i=(1.0, 0.0, 0.0), input=name) for name in ("lift", "hold")]
+    with pytest.raises(ModelError, match=r"'hold' determines the way of 'rod' along .* 'lift' determines already"):
+        System(bodies=[_rod()], constraints=drivers)
 
 
 def test_drivers_that_contradict_each_other_are_named():

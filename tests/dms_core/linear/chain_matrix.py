@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from dms_core.model.bodies.rigid_body import RigidBody, rigid_body
 from dms_core.model.constraints.euler_norm import EulerNorm, euler_norm
-from dms_core.model.constraints.revolute import Revolute, revolute
+from dms_core.model.constraints.joints.revolute import Revolute, revolute
 from dms_core.model.system import System
 
 NO_INTEGERS = np.zeros(0, np.int32)

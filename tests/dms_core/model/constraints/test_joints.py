@@ -9,14 +9,18 @@ from dms_core.errors import ModelError
 from dms_core.model.bodies import RigidBody
 from dms_core.model.constraints import (
     AngleDriver,
+    Cylindrical,
     Distance,
     Fixed,
     LineGuide,
+    Planar,
     PlaneGuide,
     PositionDriver,
     Revolute,
+    Screw,
     Slider,
     Spherical,
+    Universal,
 )
 from dms_core.model.geometry.frames import perpendicular, rotation_matrix, unit
 from dms_core.model.system import System
@@ -24,9 +28,12 @@ from tests.dms_core.model.poses import block_rate, start
 from tests.example_elements import Example
 from tests.example_elements.constraints import PAIR
 from tests.example_elements.kernel_call import kernel_calls
-from tests.example_elements.pair import LOWER, pair
+from tests.example_elements.pair import LOWER, UPPER, pair
 
 AXIS = (1.0, 0.5, -0.3)
+LEAD = 0.7
+ACROSS = rotation_matrix(LOWER.orientation).T @ rotation_matrix(UPPER.orientation) @ perpendicular(unit(AXIS, "axis"))
+"""A direction of the lower body that is across AXIS of the upper one at the start."""
 JOINTS = {
     "spherical": (Spherical(name="joint", **PAIR), "xyz"),
     "revolute": (Revolute(name="joint", axis_i=AXIS, **PAIR), "a"),
@@ -34,10 +41,15 @@ JOINTS = {
     "slider": (Slider(name="joint", axis_i=AXIS, **PAIR), "A"),
     "line_guide": (LineGuide(name="joint", axis_i=AXIS, **PAIR), "Axyz"),
     "plane_guide": (PlaneGuide(name="joint", normal_i=AXIS, **PAIR), "FGxyz"),
+    "cylindrical": (Cylindrical(name="joint", axis_i=AXIS, **PAIR), "Aa"),
+    "planar": (Planar(name="joint", axis_i=AXIS, **PAIR), "FGa"),
+    "screw": (Screw(name="joint", axis_i=AXIS, lead=LEAD, **PAIR), "S"),
+    "universal": (Universal(name="joint", axis_i=AXIS, axis_j=tuple(ACROSS), **PAIR), "au"),
     "distance": (Distance(name="joint", point_j=(0.0, -0.2, 0.1), **PAIR), "ijkxyz"),
 }
 """Each joint with its free motions. Capital A, F, G: sliding along the axis and its two perpendiculars; small: turning
-about them or about ground axes (x, y, z), at the joint; i, j, k: turning about ground axes at the rod's far end."""
+about them or about ground axes (x, y, z), at the joint; i, j, k: turning about ground axes at the rod's far end. u is
+turning about ACROSS, S the screw motion of the lead LEAD."""
 
 
 def _call(element, *inputs: str):
@@ -54,6 +66,8 @@ def _free_rates(q: np.ndarray, free: str) -> np.ndarray:
     x, y, z = np.eye(3)
     slide = {"A": a, "F": f, "G": np.cross(a, f)}
     turn = {"a": (centre, a), "x": (centre, x), "y": (centre, y), "z": (centre, z)}
+    turn |= {"u": (centre, rotation_matrix(q[10:]) @ ACROSS), "S": (centre, a)}
+    slide["S"] = LEAD / (2.0 * np.pi) * a
     turn |= {"i": (rod, x), "j": (rod, y), "k": (rod, z)}
     rates = []
     for motion in free:
@@ -193,5 +207,5 @@ class TestMistakes:
 
     def test_driver_needs_a_revolute_joint(self):
         drive = AngleDriver(name="drive", joint="ball", input="psi")
-        with pytest.raises(ModelError, match="'ball' is a spherical. Expected the name of a Revolute"):
+        with pytest.raises(ModelError, match="'ball' is a spherical. Expected the name of a .*Revolute or Screw"):
             kernel_calls(Example(pair(constraints=[Spherical(name="ball", **PAIR), drive], inputs=["psi"]), drive))

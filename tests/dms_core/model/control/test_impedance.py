@@ -187,7 +187,7 @@ class TestMistakes:
 
     def test_a_joint_that_is_none(self):
         law = ImpedanceController(name="law", joint="arm", ropes=("r",), stiffness="a", damping="b", share="c")
-        with pytest.raises(ModelError, match="'arm' is a rigid_body. Expected the name of a Revolute"):
+        with pytest.raises(ModelError, match="'arm' is a rigid_body. Expected the name of a .*Revolute or Screw"):
             law.place(pendulum())
 
     def test_a_rope_beside_the_joint(self):

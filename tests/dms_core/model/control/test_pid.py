@@ -7,7 +7,7 @@ import pytest
 
 from dms_core.errors import ModelError
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.control import Pid, ReferenceFilter
 from dms_core.model.control.pid import FILTER, OWN
 from dms_core.model.signals import Input

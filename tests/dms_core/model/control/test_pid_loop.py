@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.control import Pid, ReferenceFilter, RopeActuator
 from dms_core.model.element import Force
 from dms_core.model.forces.gravity import Gravity

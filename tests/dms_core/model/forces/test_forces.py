@@ -115,7 +115,8 @@ class TestJointSpringDamper:
 
     def test_joint_must_exist(self):
         with pytest.raises(
-            ModelError, match="'knee' does not exist. Expected the name of a Revolute. Declared: none are declared"
+            ModelError,
+            match="'knee' does not exist. Expected the name of a .*Screw. Declared: none are declared",
         ):
             _calls(JointSpringDamper(name="s", joint="knee"))
 

@@ -7,7 +7,7 @@ import pytest
 
 from dms_core.errors import ModelError
 from dms_core.model.bodies.rigid_body import RigidBody
-from dms_core.model.constraints.revolute import Revolute
+from dms_core.model.constraints.joints.revolute import Revolute
 from dms_core.model.sensors import JointAngle
 from dms_core.model.system import System
 from tests.dms_core.model.hinged import GROUND_BLOCK, sensed, turning

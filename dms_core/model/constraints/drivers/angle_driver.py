@@ -13,8 +13,8 @@ from typing import ClassVar
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.constraints.joints.axis_joint import AxisJoint
 from dms_core.model.constraints.primitives import joint_pattern
-from dms_core.model.constraints.revolute import Revolute
 from dms_core.model.element import Constraint, Placement, Vector
 from dms_core.model.geometry.angle import (
     ANGLE,
@@ -44,11 +44,11 @@ def angle_driver(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
 
 
 class AngleDriver(Constraint):
-    """The angle of a revolute joint follows an input [rad]."""
+    """The angle of a joint about an axis follows an input [rad]."""
 
     kind: ClassVar[str] = "angle_driver"
     kernel: ClassVar = angle_driver
-    joint: str = Field(description="revolute joint")
+    joint: str = Field(description="joint about an axis")
     input: str = Field(description="input that gives the angle [rad]; it must be twice differentiable")
     pointer_i: Vector | None = Field(default=None, description="direction in body_i [-]; default: any, see angle_frame")
     pointer_j: Vector | None = Field(default=None, description="direction in body_j that lies along it at angle 0 [-]")
@@ -57,9 +57,13 @@ class AngleDriver(Constraint):
         """Angle minus input [rad]."""
         return ("angle",)
 
+    def governs(self) -> str:
+        """An angle can be driven once."""
+        return f"the angle of '{self.joint}'"
+
     def place(self, system) -> Placement:
         """Both bodies of the joint, the angle's frame, the input."""
-        joint = system.element(self.joint, Revolute)
+        joint = system.element(self.joint, AxisJoint)
         who = f"angle_driver '{self.name}'"
         frame = angle_frame(system, who, joint, self.pointer_i, self.pointer_j)
         return Placement(

@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.constraints.joints.relative_pose import joint_arms, relative_rotation
 from dms_core.model.constraints.primitives import dot1, dot2, joint_pattern
-from dms_core.model.constraints.relative_pose import joint_arms, relative_rotation
 from dms_core.model.element import GROUND, Constraint, Placement, Quaternion, Vector
 from dms_core.model.geometry.frames import perpendicular, unit
 from dms_core.model.geometry.rotations import vec

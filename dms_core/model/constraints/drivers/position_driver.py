@@ -59,6 +59,11 @@ class PositionDriver(Constraint):
         """Position minus input [m]."""
         return ("position",)
 
+    def governs(self) -> str:
+        """A point can be driven along a direction once."""
+        where = f"from {self.point_i} to {self.point_j}"
+        return f"the way of '{self.body_j}' along {self.axis_i} of '{self.body_i}' {where}"
+
     def place(self, system) -> Placement:
         """Both bodies, the measured direction, the input."""
         axis = unit(self.axis_i, f"position_driver '{self.name}': axis_i")

@@ -12,8 +12,8 @@ from typing import ClassVar, NamedTuple
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.constraints.joints.relative_pose import joint_arms
 from dms_core.model.constraints.primitives import coincidence, joint_pattern
-from dms_core.model.constraints.relative_pose import joint_arms
 from dms_core.model.element import GROUND, Constraint, Placement, Vector
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.places import numbers_at
