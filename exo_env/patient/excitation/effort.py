@@ -3,7 +3,7 @@
 For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activations a_k of the motor command:
 
     c_k = delayed(s a_k, neural delay) + sign (feedback_gain + feedback_scaling A) y^      what is intended, at least 0
-    A = mean(delayed(s a), up to maximum_activation) / (1 + (psi' / 1 rad/s)^2)            of the group with more of it
+    A = mean(maximum_activation M_A) / (1 + (psi' / 1 rad/s)^2)                            of the group with more of it
     T_k = (c_k + co_contraction mean(c of the other group)) / maximum_activation_g         wanted share, at most 1,
           with c of the other group up to its maximum_activation
     d_k = maximum_activation_g min(T_k, 1 - M_F,k)                                         voluntary drive
@@ -11,13 +11,13 @@ For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activ
           + sign tremor_amplitude sin(phase)                                               tremor
     u_k = delayed(d_k, electromechanical delay), within 0.01 to 1
 
-s is the effort (slacking.py), A the activity of who holds, M_F the fatigued share (fatigue.py), y^ the error with its
-lead, which is felt late and predicted from there to now (forward_model.py). Weakness is a ceiling, since what was
-measured after stroke is the largest torque: who is weak wants a larger share of what is left for the same moment, and
-gives it up to all of it. That patients know their weakness so well is assumed; the rest of it they learn by their
-errors (s above 1). Weakness is of the descending command: reflex and tremor know no ceiling. Tremor alternates between
-the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of
-that width at half height.
+s is the effort (slacking.py), A the activity of who holds, M_A and M_F the active and the fatigued share (fatigue.py),
+y^ the error with its lead, which is felt late and predicted from there to now (forward_model.py). Weakness is a
+ceiling, since what was measured after stroke is the largest torque: who is weak wants a larger share of what is left
+for the same moment, and gives it up to all of it. That patients know their weakness so well is assumed; the rest of it
+they learn by their errors (s above 1). Weakness is of the descending command: reflex and tremor know no ceiling. Tremor
+alternates between the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a
+spectral peak of that width at half height.
 
 A patient acts every TICK, whatever the control rate of the device is: 50 times a second, which few motor units of the
 biceps exceed in the strongest contractions (31 +- 10 Hz, Bellemare et al. 1983, J. Neurophysiol. 50:1380-1392), so that
@@ -144,19 +144,19 @@ def feedback(par, state, planned_rate, period):
         # What the model expects is known at the end of the period.
         then = delayed(state.expected, 0, newest, max(delay / period, 1.0))
         error -= share * (state.expected[0, newest] - then)
-    more = par[PATIENT.feedback_scaling] * activity(par, state, planned_rate, period)
+    more = par[PATIENT.feedback_scaling] * activity(par, state, planned_rate)
     return (par[PATIENT.feedback_gain] + more) * error
 
 
 @compiled
-def activity(par, state, planned_rate, period):
-    """A: mean of the delayed command in the group that has more of it, less where the plan moves [-]."""
-    newest, late, most = int(state.present[PRESENT.newest]), par[PATIENT.neural_delay] / period, 0.0
+def activity(par, state, planned_rate):
+    """A: mean activity of the group that has more of it, less where the plan moves [-]."""
+    most = 0.0
     for sign in (1.0, -1.0):
         total, count = 0.0, 0
         for k in range(state.sign.shape[0]):
             if state.sign[k] == sign:
-                total += min(max(delayed(state.command, k, newest, late), 0.0), largest_activation(par, sign))
+                total += largest_activation(par, sign) * state.active[k]
                 count += 1
         most = max(most, total / max(count, 1))
     return most / (1.0 + (planned_rate / HOLDING) ** 2)
