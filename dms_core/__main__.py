@@ -1,7 +1,8 @@
 """Command line of the DMS platform: check, run and describe model files.
 
 python -m dms_core check MODEL.yaml
-python -m dms_core run MODEL.yaml --t-end T --rtol R [--sample DT] --out FILE.csv [--stats FILE.json] [--overwrite]
+python -m dms_core run MODEL.yaml --t-end T --rtol R [--method NAME] [--sample DT] --out FILE.csv
+                                      [--stats FILE.json] [--overwrite]
 python -m dms_core schema [--out FILE] [--overwrite]
 """
 
@@ -25,6 +26,7 @@ from dms_core.files.outputs import OutputFile, Outputs, partial
 from dms_core.model_file import load
 from dms_core.results import Result, States
 from dms_core.schema import reference
+from dms_core.simulation.options import MethodName
 
 ROWS = 10_000
 """Rows of a table in memory at once."""
@@ -80,6 +82,7 @@ def run(
     sample: float | None = None,
     stats: FileOut | None = None,
     step: float | None = None,
+    method: MethodName = SolverOptions.method,
     overwrite: bool = False,
 ) -> int:
     """Run a model file from its assembled start and write sensors, coordinates and rates as CSV.
@@ -98,9 +101,11 @@ def run(
         stats: JSON file for the solver's statistics.
         step: constant step [s], at most t_end, instead of error control; rtol then only sets how far Newton's method
             goes. Where t_end is no multiple of it, the last step is shorter, and the message says so.
+        method: method of integration: bdf2 (of order 2), sdirk2 (of order 2, for inputs that jump all the time), or
+            radau5 (of order 5, for errors below about 1e-5 of the motion).
         overwrite: replace files of these names.
     """
-    options = _options(t_end, sample, rtol, atol, step)
+    options = _options(t_end, sample, rtol, atol, step, method)
     files = [OutputFile("--out", out), *([] if stats is None else [OutputFile("--stats", stats)])]
     with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
         trajectory = _simulated(compiled(model), options, t_end, sample)
@@ -120,7 +125,9 @@ def run(
     return FAILED_RUN if outputs.failed else 0
 
 
-def _options(t_end: float, sample: float | None, rtol: float, atol: float | None, step: float | None) -> SolverOptions:
+def _options(
+    t_end: float, sample: float | None, rtol: float, atol: float | None, step: float | None, method: MethodName
+) -> SolverOptions:
     """The options of `run`, checked.
 
     Raises:
@@ -136,7 +143,7 @@ def _options(t_end: float, sample: float | None, rtol: float, atol: float | None
     for name, value in (("--step", step), ("--sample", sample)):
         if value is not None and value > t_end:
             raise InputError(f"{name}: Expected at most --t-end = {t_end} s, got {value} s.")
-    return SolverOptions(rtol=rtol, atol=atol, fixed_step=step)
+    return SolverOptions(rtol=rtol, atol=atol, fixed_step=step, method=method)
 
 
 def _simulated(model: Model, options: SolverOptions, t_end: float, sample: float | None) -> Trajectory:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals
+from dms_core.dense_output import Rates, cubic, quintic
 from dms_core.errors import DmsError, InputError, SimulationError, choices
 from dms_core.flags import Flag, Limits, input_values
 
@@ -73,7 +74,14 @@ class Trajectory:
     """
 
     def __init__(
-        self, model: Model, signals: Signals, record: np.ndarray, result: Result, stats: SolveStats, message: str
+        self,
+        model: Model,
+        signals: Signals,
+        record: np.ndarray,
+        result: Result,
+        stats: SolveStats,
+        message: str,
+        rates: Rates | None = None,
     ) -> None:
         n, m = model.n_q, model.n_phi
         self.model, self.signals = model, signals
@@ -81,7 +89,7 @@ class Trajectory:
         self.q, self.v, self.a = (record[:, 1 + k * n : 1 + (k + 1) * n].copy() for k in range(3))
         self._lam = record[:, 1 + 3 * n : 1 + 3 * n + m].copy()
         self.mu = record[:, 1 + 3 * n + m :].copy()
-        self.result, self.stats, self._message = result, stats, message
+        self.result, self.stats, self._message, self._rates = result, stats, message, rates
 
     @cached_property
     def flags(self) -> tuple[Flag, ...]:
@@ -129,7 +137,9 @@ class Trajectory:
         """Dense output: states at any times inside the run; at a jump the value before it.
 
         q is the cubic through q and v at both ends of a step, v that through v and vdot (for first-order coordinates
-        the slope of q), vdot its slope; lam and mu are linear in a step. All are of the method's order, 2.
+        the slope of q), vdot its slope; lam and mu are linear in a step. All are of the order of BDF2 and SDIRK2, 2.
+        Behind Radau IIA second-order coordinates are the quintic of dense_output.py, of order 5, and vdot and lam solve
+        the equations at its q and v.
 
         Args:
             times: [s], shape (k,), between the first and the last recorded time.
@@ -149,13 +159,21 @@ class Trajectory:
         h = (self.t[end] - self.t[start])[:, None]
         h = np.where(h > 0.0, h, 1.0)
         x = (times - self.t[start])[:, None] / h
+        between = lambda values: (1.0 - x) * values[start] + x * values[end]  # noqa: E731
+        mu, least = between(self.mu), [c.least for c in self.model.layout.coordinates]
+        if self._rates is not None:
+            ends = [(y[start], y[end]) for y in (self.q, self.v, self.a)]
+            q, v, a = quintic(x, h, ends, self.model.second_order)
+            q = np.maximum(q, least)
+            v, a, lam = self._rates(self.model, self.signals, times, q, v, a, between(self._lam))
+            lam = self.model.whole_multipliers(self.signals, times, q, v, a, lam, np.zeros(len(times), bool))
+            return States(self.model, self.signals, times, q, v, a, self.model.unique_multipliers(q, lam), mu)
         second = self.model.second_order
-        q, slope_q, _ = _hermite(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
-        v, slope_v, _ = _hermite(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
+        q, slope_q, _ = cubic(x, h, self.q[start], self.q[end], self.v[start], self.v[end])
+        v, slope_v, _ = cubic(x, h, self.v[start], self.v[end], self.a[start], self.a[end])
         unique, whole = self.model.unique_multipliers, self._whole_lam
         lam = (1.0 - x) * unique(self.q[start], whole[start]) + x * unique(self.q[end], whole[end])
-        mu = (1.0 - x) * self.mu[start] + x * self.mu[end]
-        q = np.maximum(q, [c.least for c in self.model.layout.coordinates])
+        q = np.maximum(q, least)
         v, a = np.where(second, v, slope_q), np.where(second, slope_v, 0.0)
         return States(self.model, self.signals, times, q, v, a, lam, mu)
 
@@ -208,14 +226,6 @@ class States:
         """Every component of every sensor by name, shape (k,) each."""
         y = self.model.measure(self.signals, self.t, self.q, self.v, self.a, self.lam, self.behind)
         return {name: y[:, k] for k, (name, _) in enumerate(self.model.layout.outputs)}
-
-
-def _hermite(x, h, y0, y1, d0, d1):  # noqa: ANN001, ANN202
-    """Cubic through values and slopes at both ends: value, first derivative, second derivative at x in [0, 1]."""
-    e = y1 - y0
-    b, c = 3.0 * e - h * (2.0 * d0 + d1), h * (d0 + d1) - 2.0 * e
-    value = y0 + x * (h * d0 + x * (b + x * c))
-    return value, d0 + x * (2.0 * b + 3.0 * x * c) / h, (2.0 * b + 6.0 * x * c) / (h * h)
 
 
 def _behind_jumps(t: np.ndarray) -> np.ndarray:

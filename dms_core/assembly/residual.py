@@ -120,6 +120,24 @@ def evaluate_newton(dynamics, constraints, pattern, w, c0, values):
 
 
 @compiled
+def evaluate_newton_pair(dynamics, constraints, pattern, w, c0, values, complex_c0, complex_values):
+    """As evaluate_newton, and with the same derivatives the matrix of a complex c0."""
+    x, y = views(dynamics, w), views(constraints, w)
+    x.r2[:] = 0.0
+    x.gmu[:] = 0.0
+    begin_newton(pattern, values)
+    begin_newton(pattern, complex_values)
+    for e in ints(dynamics, CALLS.moving):
+        _dynamic_derivatives(x, dynamics, e, w)
+        scatter_dynamic(pattern, e, w, 1.0 / c0, values)
+        scatter_dynamic(pattern, e, w, 1.0 / complex_c0, complex_values)
+    for e in ints(constraints, CALLS.moving):
+        _constraint_derivatives(y, constraints, e, w)
+        scatter_constraint(pattern, e, w, 1.0 / c0, values)
+        scatter_constraint(pattern, e, w, 1.0 / complex_c0, complex_values)
+
+
+@compiled
 def evaluate_rates(dynamics, constraints, pattern, w, values):
     """r2, phi_a and the matrix of the acceleration problem (see sparsity.rate_pattern)."""
     x, y = views(dynamics, w), views(constraints, w)

@@ -76,6 +76,7 @@ def _pointer_to(element: Any) -> Any:
 
 
 _float64 = _pointer_to(types.float64)
+_complex128 = _pointer_to(types.complex128)
 _int64 = _pointer_to(types.int64)
 _int32 = _pointer_to(types.int32)
 _uint32 = _pointer_to(types.uint32)
@@ -92,6 +93,12 @@ def table_at(address, rows):
 def floats(table, k):
     """Field k as a vector of floats."""
     return carray(_float64(table[k, 0]), (table[k, 1],))
+
+
+@compiled(makes_arrays=True)
+def complexes(table, k):
+    """Field k, floats in pairs of real and imaginary parts, as a vector of complex numbers."""
+    return carray(_complex128(table[k, 0]), (table[k, 1] // 2,))
 
 
 @compiled(makes_arrays=True)

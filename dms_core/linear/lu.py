@@ -5,6 +5,9 @@ subtracts multiples of its row from theirs. All targets are tabulated (symbolic.
 pass through a list of blocks of eight numbers. The storage array `a` holds the matrix before (zeroed, then
 a[tables.position[e]] += value[e]), and after it L below and U right of the diagonal, with the inverse of each pivot in
 its place. Everything is compiled to be called from compiled code; the same input gives the same bits.
+
+Numbers are real, or all arrays are complex; storage is then asked for twice as many reals, and seen as complex:
+storage(2 * tables.size).view(complex).
 """
 
 from __future__ import annotations
@@ -33,6 +36,12 @@ def storage(length: int, worlds: int | None = None) -> np.ndarray:
     return block[0] if worlds is None else block
 
 
+@compiled
+def _magnitude(x):
+    """|x| of a real number, |Re x| + |Im x| of a complex one: within a factor of 1.5 of |x|, without its root."""
+    return abs(x.real) + abs(x.imag)
+
+
 @compiled(fastmath={"contract", "reassoc"})
 def factor(tables, a, work):
     """Factors in place; returns (smallest relative pivot, its step).
@@ -50,13 +59,13 @@ def factor(tables, a, work):
     for k in range(tables.n):
         total = 0.0
         for p in range(tables.first[k], tables.end[k]):
-            total += abs(a[p])
+            total += _magnitude(a[p])
         work[k] = total
     smallest, where, t = np.inf, -1, _U(0)
     for k in range(tables.n):
         diagonal, lane, end = _U(tables.diagonal[k]), _U(tables.lane[k]), _U(tables.end[k])
         pivot = a[diagonal + lane]
-        ratio = abs(pivot) / work[k]
+        ratio = _magnitude(pivot) / work[k].real
         if not ratio >= smallest:
             if not 0.0 < ratio < np.inf:
                 return 0.0, k

@@ -20,6 +20,7 @@ from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.inspection import Inspection
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
+from dms_core.simulation.rates_between import rates_between
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state, with_tables
 from dms_core.simulation.step_control import OUTCOME
@@ -53,10 +54,11 @@ class World(Inspection):
         self.options = options or SolverOptions()
         self._numbers = self.options.numbers()
         self._tables: Packed = self.model.tables
-        start = self.model.start
+        start, radau = self.model.start, self.options.method == "radau5"
         self._world = new_state(
-            self._tables.values, self.model.new_work(), self.model.new_signals(), part_addresses(), start.q, start.v
-        )
+            self._tables.values, self.model.new_work(), self.model.new_signals(), part_addresses(radau),
+            start.q, start.v, radau,
+        )  # fmt: skip
         self.state: State = self._world.values
         self._buffer = np.zeros((0, 1 + 3 * self.model.n_q + 2 * self.model.n_phi))
         self.result = Result.SUCCESS
@@ -300,7 +302,10 @@ class Simulation(World):
                 raise KeyboardInterrupt
             raise SimulationError(f"nothing was computed: {self.message}")
         signals = with_settings(self.state.signals, self._settings)
-        return Trajectory(self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message)
+        rates = rates_between if self.options.method == "radau5" else None
+        return Trajectory(
+            self.model, signals, np.concatenate(self._rows), self.result, self.stats(), self.message, rates
+        )
 
 
 def simulate(

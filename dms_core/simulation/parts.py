@@ -41,6 +41,11 @@ class Parts(NamedTuple):
     restart: int
     advance: int
     """step_control.py"""
+    radau_matrices: int
+    radau_solutions: int
+    """radau_matrices.py; these and what follows are 0 where another method runs."""
+    radau5_step: int
+    """radau5.py"""
 
 
 PARTS = fields(Parts)
@@ -51,6 +56,7 @@ _PAIR = types.UniTuple(types.int64, 2)
 STAGE = _PAIR(TABLE, TABLE, _OPTIONS, types.float64, types.float64, types.float64, types.boolean)
 RATES = types.boolean(TABLE, TABLE, types.float64)
 RESTART = types.boolean(TABLE, TABLE, _OPTIONS)
+STEP = types.Tuple((types.int64, types.int64, types.float64))(TABLE, TABLE, _OPTIONS, types.float64)
 ADVANCE = _PAIR(TABLE, TABLE, _OPTIONS, types.float64, _RECORD, types.int64)
 
 
@@ -62,6 +68,11 @@ def _call_stage(typingctx, address, m, s, o, t, c0, lam_slope, last):  # noqa: A
 @intrinsic
 def _call_rates(typingctx, address, m, s, c0):  # noqa: ANN001, ANN202
     return call_by_address(RATES)
+
+
+@intrinsic
+def _call_step(typingctx, address, m, s, o, h):  # noqa: ANN001, ANN202
+    return call_by_address(STEP)
 
 
 @intrinsic
@@ -90,6 +101,12 @@ def run_stage(m, s, o, t, c0, lam_slope, last):
 def run_rates(m, s, part, c0):
     """Run one of the three functions of initial_rates.py that find accelerations and multipliers."""
     return _call_rates(ints(s, STATE.parts)[part], m, s, c0)
+
+
+@compiled
+def run_radau5(m, s, o, h):
+    """Run `radau5.radau5_step`."""
+    return _call_step(ints(s, STATE.parts)[PARTS.radau5_step], m, s, o, h)
 
 
 @compiled

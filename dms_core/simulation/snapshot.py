@@ -24,6 +24,7 @@ from dms_core.linear.lu import LuTables
 from dms_core.model.signals import Function
 from dms_core.results import Result
 from dms_core.simulation.options import SolverOptions
+from dms_core.simulation.radau_state import NOT_USED
 from dms_core.simulation.state import CLOCK, State, with_tables
 
 GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")
@@ -75,6 +76,8 @@ def _held_parts(state: State) -> Iterator[tuple[str, np.ndarray]]:
     for name, x in state._asdict().items():
         if isinstance(x, np.ndarray) and x.dtype == np.float64:
             yield name, x
+    if state.radau is not NOT_USED:
+        yield from ((f"radau.{name}", x) for name, x in state.radau.values._asdict().items())
 
 
 def _digest(*parts: Any) -> str:

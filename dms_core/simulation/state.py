@@ -24,6 +24,7 @@ from dms_core.assembly.tables import WORK, Signals, Tables, Work
 from dms_core.compiled.arena import Packed, fields, floats, inner, ints
 from dms_core.compiled.jit import compiled
 from dms_core.linear.lu import storage
+from dms_core.simulation.radau_state import NOT_USED, new_radau_state
 
 
 class Clock(NamedTuple):
@@ -117,6 +118,17 @@ class State(NamedTuple):
     rate_x: np.ndarray
     parts: np.ndarray
     """Addresses of the parts of a step, see parts.py."""
+    radau: Packed
+    """A packed RadauState, what Radau IIA carries beside; its arrays are empty where another method runs."""
+
+
+class Method(NamedTuple):
+    """Methods of integration."""
+
+    bdf2: int
+    """Behind a start by SDIRK2."""
+    sdirk2: int
+    radau5: int
 
 
 class Options(NamedTuple):
@@ -132,11 +144,12 @@ class Options(NamedTuple):
     newton_tol: float
     constraint_tol: float
     max_steps: int
-    one_step: int
-    """1 for SDIRK2 throughout, 0 for BDF2 behind an SDIRK2 start."""
+    method: int
+    """A place in `Method`."""
 
 
 STATE, CLOCK, COUNTS, LARGEST = fields(State), fields(Clock), fields(Counts), fields(Largest)
+METHOD = fields(Method)
 
 
 def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
@@ -153,15 +166,17 @@ def _linear_arrays(tables: Tables) -> dict[str, np.ndarray]:
     }
 
 
-def new_state(tables: Tables, w: Work, signals: Signals, parts: np.ndarray, q: np.ndarray, v: np.ndarray) -> Packed:
-    """A world at its start: q and v of shape (n_q,); `parts` from `addresses.part_addresses`."""
+def new_state(
+    tables: Tables, w: Work, signals: Signals, parts: np.ndarray, q: np.ndarray, v: np.ndarray, radau: bool = False
+) -> Packed:
+    """A world at its start: q and v of shape (n_q,); `parts` from `addresses.part_addresses`; `radau`: for radau5."""
     n, m = len(tables.second), len(w.lam)
     histories = ("q", "v", "qd", "vd", "q_before", "v_before", "cq", "cv", "q_guess", "v_guess", "wq", "wv")
     state = State(
         w=w, signals=signals, clock=np.zeros(len(CLOCK)),
         counts=np.zeros(len(COUNTS), np.int64), largest=np.zeros(len(LARGEST)), parts=parts,
         **{name: np.zeros(n) for name in histories}, **{name: np.zeros(m) for name in ("lam", "mu", "lam_before")},
-        **_linear_arrays(tables),
+        **_linear_arrays(tables), radau=new_radau_state(tables, m, radau),
     )  # fmt: skip
     packed = Packed(state)
     rewind(packed.table, q, v, 0.0)
@@ -202,4 +217,5 @@ def with_tables(tables: Tables, state: State) -> Packed:
     state.counts[COUNTS.rates_factored] = 0
     state.lam[:], state.mu[:] = 0.0, 0.0
     state.w.lam[:], state.w.mu[:] = 0.0, 0.0
-    return Packed(State(**{**state._asdict(), **_linear_arrays(tables)}))
+    radau = new_radau_state(tables, len(state.lam), state.radau is not NOT_USED)
+    return Packed(State(**{**state._asdict(), **_linear_arrays(tables), "radau": radau}))

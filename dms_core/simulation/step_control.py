@@ -1,22 +1,27 @@
 """The loop over steps: size, acceptance, jumps of the inputs, recording.
 
 The next size is 0.9 err^(-1/3) h (order 2), lowered when Newton needed many iterations (paper sect. 2.3; the formula
-is that of Hairer and Wanner 1996, IV.8), and left alone when it would change by less than a fifth: an unchanged step
-keeps the factorised matrix good.
+is that of Hairer and Wanner 1996, IV.8), and left alone when it would grow by less than a fifth: an unchanged step
+keeps the factorised matrix good. Where all coordinates are of second order, BDF2 takes the next smaller size of a grid,
+1.4^k, instead. There motions may be reversible, as that of a body that tumbles, and BDF2's leading error then cancels
+if steps depend on the state and not on the way there, but not if they grow late and shrink at once. Radau IIA has a
+rule of its own (radau5.py).
 """
 
 import math
 from typing import NamedTuple
 
-from dms_core.assembly.tables import SIGNALS, WORK
-from dms_core.compiled.arena import fields, floats, inner, ints
+from dms_core.assembly.tables import MODEL, SIGNALS, WORK
+from dms_core.compiled.arena import fields, flags, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.bdf2 import bdf2_step
 from dms_core.simulation.implicit_stage import set_weights
 from dms_core.simulation.newton import MAX_ITERATIONS, NEWTON, note_errors
-from dms_core.simulation.parts import PARTS, run_rates, set_inputs
+from dms_core.simulation.parts import PARTS, run_radau5, run_rates, set_inputs
+from dms_core.simulation.radau_constants import ORDER_OF_ERROR, REAL
+from dms_core.simulation.radau_state import CONTROL, RADAU
 from dms_core.simulation.sdirk2 import GAMMA, sdirk2_step
-from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, METHOD, STATE
 
 
 class Outcome(NamedTuple):
@@ -35,6 +40,9 @@ OUTCOME = fields(Outcome)
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 2.0
 DEAD_ZONE = 1.2
+"""Growth up to which a step is left alone."""
+GRID, GRID_SAFETY = math.log(1.4), 0.99
+"""Logarithm of the ratio of neighbouring sizes on the grid; on average a step is a sixth below what is allowed."""
 LONGEST_START = 1e-3
 """Largest first step of a run [s]: at rest nothing tells yet how soon an input will move."""
 NEAR = 32
@@ -112,7 +120,7 @@ def restart_method(m, s, o):
     set_inputs(m, s, clock[CLOCK.t], False)
     ints(s, STATE.counts)[COUNTS.restarts] += 1
     clock[CLOCK.worst] = 0.0
-    if not (o.one_step == 1 and run_rates(m, s, PARTS.jump_rates, 0.0)) and not run_rates(
+    if not (o.method == METHOD.sdirk2 and run_rates(m, s, PARTS.jump_rates, 0.0)) and not run_rates(
         m, s, PARTS.consistent_rates, 0.0
     ):
         return False
@@ -135,6 +143,9 @@ def landing_size(h, rest, fixed, equal):
 @compiled
 def try_step(m, s, o, h, started):
     """One attempt; gives (code, iterations per stage, error, c0)."""
+    if o.method == METHOD.radau5:
+        code, iterations, error = run_radau5(m, s, o, h)
+        return code, 1.0 * iterations, error, REAL / h
     if started:
         code, iterations, error = sdirk2_step(m, s, o, h)
         return code, 0.5 * iterations, error, 1.0 / (GAMMA * h)
@@ -144,27 +155,56 @@ def try_step(m, s, o, h, started):
 
 
 @compiled
-def resize(h, error, iterations):
-    """The next step size from the error and the Newton count."""
+def growth(error, iterations, safety):
+    """Next step size over the last, from the error and the Newton count."""
     effort = (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
-    factor = GROW if error <= 0.0 else SAFETY * effort * error ** (-1.0 / 3.0)
-    factor = min(GROW, max(SHRINK, factor))
+    factor = GROW if error <= 0.0 else safety * effort * error ** (-1.0 / 3.0)
+    return min(GROW, max(SHRINK, factor))
+
+
+@compiled
+def resize(h, error, iterations):
+    """The next step size, h where it would hardly grow."""
+    factor = growth(error, iterations, SAFETY)
     return h if 1.0 <= factor < DEAD_ZONE else h * factor
+
+
+@compiled
+def all_of_second_order(m):
+    """Whether no coordinate that is solved for is of first order."""
+    second = flags(m, MODEL.second)
+    for i in naturals(m, MODEL.free):
+        if not second[i]:
+            return False
+    return True
+
+
+@compiled
+def size_behind(m, s, o, h, error, iterations):
+    """Size that the step behind an accepted one should have."""
+    if o.method == METHOD.radau5:
+        return floats(inner(s, STATE.radau), RADAU.control)[CONTROL.wanted]
+    if o.method == METHOD.bdf2 and all_of_second_order(m):
+        # A size that is on the grid but for rounding stays.
+        place = math.log(h * growth(error, iterations, GRID_SAFETY)) / GRID
+        return math.exp(GRID * math.floor(place + 1e-9))
+    return resize(h, error, iterations)
 
 
 @compiled
 def one_step(m, s, o, stop, kept):
     """Attempts until one step is accepted; gives OUTCOME.done or what went wrong. `kept`: the step is recorded."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
-    started = count[COUNTS.restart] == 1 or o.one_step == 1
+    started = count[COUNTS.restart] == 1 or o.method == METHOD.sdirk2
+    power = -1.0 / ORDER_OF_ERROR if o.method == METHOD.radau5 else -1.0 / 3.0
     set_weights(m, s, o)
     wanted = o.fixed_step if fixed else min(clock[CLOCK.h_wanted], o.h_max)
     if not fixed and wanted < o.h_min:
         return OUTCOME.step_too_small
-    if not started and not fixed:
+    if not started and not fixed and o.method == METHOD.bdf2:
         wanted = min(wanted, GROW * clock[CLOCK.h_before])
     rest = stop - clock[CLOCK.t]
-    equal = o.one_step == 1 and not fixed and rest <= NEAR * wanted
+    equal = o.method == METHOD.sdirk2 and not fixed and rest <= NEAR * wanted
     first_try = True
     while True:
         h = landing_size(wanted, rest, fixed, equal)
@@ -175,13 +215,13 @@ def one_step(m, s, o, stop, kept):
             break
         if code == NEWTON.converged:
             count[COUNTS.rejected_error] += 1
-            wanted = h * max(SHRINK, min(0.9, SAFETY * error ** (-1.0 / 3.0)))
+            wanted = h * max(SHRINK, min(0.9, SAFETY * error**power))
         else:
             count[COUNTS.rejected_newton] += 1
             count[COUNTS.stale] = 1
-            wanted = 0.25 * h
+            wanted = h * (0.5 if o.method == METHOD.radau5 else 0.25)
             # Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
-            if first_try and o.one_step == 1:
+            if first_try and o.method == METHOD.sdirk2:
                 set_inputs(m, s, clock[CLOCK.t], False)
                 if not run_rates(m, s, PARTS.consistent_rates, 0.0):
                     return OUTCOME.rates_failed
@@ -192,25 +232,28 @@ def one_step(m, s, o, stop, kept):
     accept(s, h, c0, started)
     if h == rest:
         land(s, stop)
-    # Multipliers and accelerations of a stage are of order 1; those that belong to its q and v are of order 2. SDIRK2
-    # throughout wants them between two landings only for a record.
-    wanted_rates = kept or h == rest if o.one_step == 1 else started
-    stage_c0 = c0 if h == rest else 0.0
+    # Multipliers and accelerations of a stage are of order 1 (Radau IIA: 3); those that belong to its q and v are of
+    # the method's order. Methods without a past want them between two landings only for a record.
+    wanted_rates = started if o.method == METHOD.bdf2 else kept or h == rest
+    stage_c0 = c0 if h == rest and o.method == METHOD.sdirk2 else 0.0
     if (
         wanted_rates
-        and not (o.one_step == 1 and run_rates(m, s, PARTS.stage_rates, stage_c0))
+        and not (o.method != METHOD.bdf2 and run_rates(m, s, PARTS.stage_rates, stage_c0))
         and not run_rates(m, s, PARTS.consistent_rates, 0.0)
+        # Those of Radau IIA's last stage, of order 3, stand in where a kink of a fibre leaves none for its q and v.
+        and o.method != METHOD.radau5
     ):
         return OUTCOME.rates_failed
     if equal:
         clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
         if h == rest or not first_try:
             clock[CLOCK.h_wanted] = max(
-                resize(h, clock[CLOCK.worst], iterations), wanted if h < wanted and first_try else 0.0
+                resize(h, clock[CLOCK.worst], iterations),
+                wanted if h < wanted and first_try else 0.0,
             )
             clock[CLOCK.worst] = 0.0
     elif not fixed:
-        size = resize(h, error, iterations)
+        size = size_behind(m, s, o, h, error, iterations)
         # A step cut short by a landing says little about the size that the motion allows.
         clock[CLOCK.h_wanted] = max(size, wanted) if h < wanted and first_try else size
     return OUTCOME.done

@@ -13,6 +13,7 @@ from dms_core.files.output_file import check_size, write_csv
 from dms_core.files.outputs import OutputFile, Outputs, partial
 from dms_core.model.muscles.activation import MINIMUM
 from dms_core.results import Result
+from dms_core.simulation.options import MethodName
 from exo_env.ecosystem import bare_arm as bare
 
 COLUMNS = 1 + 3 + 6 * 4 + 6
@@ -26,6 +27,7 @@ def arm26(
     start_deg: float = 20.0,
     start_activation: float = 0.05,
     rtol: float = SolverOptions.rtol,
+    method: MethodName = SolverOptions.method,
     sample: float = 0.01,
     overwrite: bool = False,
 ) -> int:
@@ -39,13 +41,14 @@ def arm26(
         start_deg: elbow flexion at the start [deg].
         start_activation: of every muscle at the start, 0.01 to 1 [-].
         rtol: relative tolerance of the error per step.
+        method: method of integration: bdf2, sdirk2 or radau5.
         sample: time between rows [s].
         overwrite: replace a file of this name.
     """
     _check(t_end, sample, start_deg, start_activation)
     with Outputs("arm26", files=[OutputFile("--out", out)], inputs=[excitations], overwrite=overwrite) as outputs:
         system = bare.bare_arm(math.radians(start_deg), bare.read_excitations(excitations), start_activation)
-        simulation = Simulation(system, SolverOptions(rtol=rtol))
+        simulation = Simulation(system, SolverOptions(rtol=rtol, method=method))
         with bar_of_run(t_end) as bar:
             simulation.advance(t_end, moves(bar))
         trajectory = simulation.trajectory()

@@ -15,6 +15,7 @@ from dms_core.errors import InputError, Stopped
 from dms_core.files.output_file import write_csv, write_json
 from dms_core.files.outputs import Outputs
 from dms_core.model.control.ziegler_nichols import Gains
+from dms_core.simulation.options import MethodName
 from exo_env.commands.tune import draw_steps
 from exo_env.ecosystem import exoskeleton as devices
 from exo_env.ecosystem import subject as subjects
@@ -36,6 +37,7 @@ def scenarios(
     exercise: Annotated[Path | None, arg(metavar="FILE.yaml")] = None,
     scenarios: Annotated[tuple[Path, ...], arg(metavar="FILE.yaml ...")] = (),
     rtol: float = SolverOptions.rtol,
+    method: MethodName = SolverOptions.method,
     overwrite: bool = False,
 ) -> int:
     """Simulate scenarios: figures, one table a scenario, and scenarios.json.
@@ -48,6 +50,7 @@ def scenarios(
         scenarios: scenarios, as in configs/scenarios/1_healthy.yaml; without them, the paper's four. The names of their
             files without the ending name the tables.
         rtol: relative tolerance of the error per step.
+        method: method of integration: bdf2, sdirk2 or radau5.
         overwrite: replace files in the folder that others wrote or changed.
     """
     require_matplotlib()
@@ -57,7 +60,7 @@ def scenarios(
     inputs = [exoskeleton, subject, exercise, *scenarios]
     with Outputs("scenarios", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
         ecosystem = Ecosystem(device=Exoskeleton.named(exoskeleton), subject=subject)
-        runs = _simulated(names, declared, theirs, ecosystem, SolverOptions(rtol=rtol))
+        runs = _simulated(names, declared, theirs, ecosystem, SolverOptions(rtol=rtol, method=method))
         summaries = [summary(r) for r in runs]
         orderings = judged(summaries, shipped=shipped) if of_the_paper else []
         for name, r in zip(names, runs, strict=True):

@@ -119,10 +119,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("method", ["bdf2", "sdirk2"])
+@pytest.mark.parametrize("method", ["bdf2", "sdirk2", "radau5"])
 @pytest.mark.parametrize("case", CASES)
 def test_the_run_is_that_of_the_whole_system(case, method):
-    system, options = CASES[case](), SolverOptions(rtol=1e-6, method=method)
+    # Radau IIA, whose tolerances are those of a coarser estimate, takes steps of its own in both runs.
+    rtol, error = (1e-9, 1e-7) if method == "radau5" else (1e-6, 1e-8)
+    system, options = CASES[case](), SolverOptions(rtol=rtol, method=method)
     model, whole = Model(system), solved_whole(system)
     assert len(model.welds.rows) and not len(whole.welds.rows)
     one, other = (simulate(m, 0.25, options).check() for m in (model, whole))
@@ -133,12 +135,12 @@ def test_the_run_is_that_of_the_whole_system(case, method):
     one, other = one.at(times), other.at(times)
     by_q, by_v = np.array([(c.scale, c.rate_scale) for c in model.layout.coordinates]).T
     # Both leave up to 5e-9 of the scales to Newton's method (0.05 of a tenth of rtol); 1e-9 is found, also in forces.
-    np.testing.assert_allclose(one.q / by_q, other.q / by_q, atol=1e-8)
-    np.testing.assert_allclose(one.v / by_v, other.v / by_v, atol=1e-8)
+    np.testing.assert_allclose(one.q / by_q, other.q / by_q, atol=error)
+    np.testing.assert_allclose(one.v / by_v, other.v / by_v, atol=error)
     assert np.ptp(other.q / by_q, axis=0).max() > 1e-2, "nothing moved"
     welded, size = model.welds.rows, np.abs(other.lam).max()
     assert np.abs(other.lam[:, welded]).max() > 100.0, "nothing pulls on the welds"
-    np.testing.assert_allclose(one.lam, other.lam, atol=1e-8 * size)
+    np.testing.assert_allclose(one.lam, other.lam, atol=error * size)
 
 
 def reactions(frame: str) -> list[JointReaction]:

@@ -16,9 +16,11 @@ import numpy as np
 import pytest
 from tqdm import tqdm
 
+from dms_core import SolverOptions, simulate
 from dms_core.command_line import BAR, FAILED_RUN, USER_MISTAKE, moves
 from dms_core.config_files import config_file, configs
 from dms_core.files.output_file import with_unit, write_csv, write_file
+from dms_core.model_file import load
 from dms_core.schema import reference
 
 ROOT = configs().parent
@@ -96,6 +98,18 @@ class TestRun:
         out = tmp_path / "run.csv"
         command("run", PENDULUM, "--t-end", 0.3, "--sample", 0.1, "--out", out)
         assert read(out)["time_s"].tolist() == [0.0, 0.1, 0.2, 0.3]  # 3 x 0.1 is just above 0.3 in binary
+
+    @pytest.mark.parametrize("method", ["bdf2", "sdirk2", "radau5"])
+    def test_each_method_swings_the_pendulum_alike(self, command, tmp_path, method):
+        out, stats = tmp_path / "run.csv", tmp_path / "stats.json"
+        done = command("run", PENDULUM, "--t-end", 0.5, "--method", method, "--rtol", 1e-7, "--out", out,
+                       "--stats", stats)  # fmt: skip
+        assert done.status == 0
+        columns, exact = read(out), simulate(load(PENDULUM), 0.5, SolverOptions(rtol=1e-11, method="radau5")).check()
+        # The methods of order 2 err by 1e-6.
+        for k, name in enumerate(exact.model.layout.names):
+            assert abs(columns[f"q.{name}"][-1] - exact.q[-1, k]) < 1e-5, name
+        assert (json.loads(stats.read_text())["steps"] < 100) == (method == "radau5")
 
     def test_a_failed_run_writes_what_it_has(self, command, tmp_path):
         out, stats = tmp_path / "run.csv", tmp_path / "stats.json"

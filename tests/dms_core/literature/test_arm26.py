@@ -36,7 +36,7 @@ from tests.arm26 import MUSCLES, arm, muscle, subject, table
 FOREARM, HUMERUS = "r_ulna_radius_hand", "r_humerus"
 
 
-def _columns(name: str) -> dict[str, np.ndarray]:
+def columns(name: str) -> dict[str, np.ndarray]:
     """A reference table by column."""
     rows = table(name)
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
@@ -67,7 +67,7 @@ def _arm(flexion_deg: float, *forces, sensors=(), inputs=()) -> System:
     )
 
 
-def _forward(flexors: float) -> Model:
+def forward_model(flexors: float) -> Model:
     """Runs A (0.15) and A2 (0.30)."""
     level = {name: (0.05 if name.startswith("TRI") else flexors) for name in MUSCLES}
     components = ("activation", "fibre_length", "tendon_force")
@@ -85,8 +85,8 @@ OPTIONS = SolverOptions(rtol=1e-8)
 @pytest.fixture(scope="module", params=["A", "A2"])
 def forward(request) -> tuple[dict, Trajectory]:
     """Reference columns and our run."""
-    rows = _columns(f"arm26_forward_{request.param}")
-    return rows, simulate(_forward({"A": 0.15, "A2": 0.30}[request.param]), rows["time_s"][-1], OPTIONS).check()
+    rows = columns(f"arm26_forward_{request.param}")
+    return rows, simulate(forward_model({"A": 0.15, "A2": 0.30}[request.param]), rows["time_s"][-1], OPTIONS).check()
 
 
 def test_model_has_one_freedom_and_no_redundancy(forward):
@@ -194,7 +194,7 @@ SINGLE = {
 
 @pytest.mark.parametrize("name", sorted(SINGLE))
 def test_single_muscle(name):
-    rows = _columns(name)
+    rows = columns(name)
     run = simulate(_single(*SINGLE[name]), rows["time_s"][-1], SolverOptions(rtol=1e-9)).check()
     # Where a time appears twice, the first row is before the jump and the second behind it.
     behind = np.append(np.diff(rows["time_s"]) == 0.0, False)
@@ -208,8 +208,8 @@ def test_single_muscle(name):
 
 def test_default_tolerance_is_enough_for_a_figure():
     """What a user gets without choosing options; 4e-5 rad and 0.03 N were seen."""
-    rows = _columns("arm26_forward_A")
-    run = simulate(_forward(0.15), rows["time_s"][-1]).check()
+    rows = columns("arm26_forward_A")
+    run = simulate(forward_model(0.15), rows["time_s"][-1]).check()
     y = run.sensors(rows["time_s"])
     assert np.abs(y["elbow.angle"] - rows["elbow_flexion_rad"]).max() < 1e-4
     assert np.abs(y["BIClong_sensor.tendon_force"] - rows["BIClong_tendon_force_N"]).max() < 0.1

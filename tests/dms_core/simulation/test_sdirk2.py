@@ -142,5 +142,5 @@ def _residual(model: Model, run: Trajectory, k: int, inputs: int) -> np.ndarray:
 
 
 def test_unknown_methods_are_named():
-    with pytest.raises(InputError, match="method: Expected 'bdf2' or 'sdirk2', got 'rk4'"):
+    with pytest.raises(InputError, match="method: Expected one of bdf2, radau5, sdirk2, got 'rk4'"):
         SolverOptions(method="rk4")  # type: ignore[arg-type]

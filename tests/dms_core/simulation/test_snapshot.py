@@ -30,7 +30,7 @@ from dms_core.simulation.dynamics import Simulation, SolverOptions, World
 from dms_core.simulation.snapshot import GLOBAL_WORK, held_arrays
 from tests.dms_core.assembly.specimen import specimen
 
-METHODS = ("bdf2", "sdirk2")
+METHODS = ("bdf2", "sdirk2", "radau5")
 LOCAL_WORK = {
     "q_l", "v_l", "a_l", "lam_l", "u_l", "r_l", "Jq", "Jv", "Ja", "phi_l", "phi_t_l", "G", "W", "H", "y_l", "Yq", "Yv",
     "Ya", "Yl", "Yu",
@@ -221,11 +221,12 @@ def test_a_simulation_records_from_the_restored_time_on(hanging):
 
 def test_every_array_of_a_world_is_held_or_local(hanging):
     assert set(Work._fields) == LOCAL_WORK | set(GLOBAL_WORK)
-    state = _world(hanging, "bdf2").state
+    state = _world(hanging, "radau5").state
     held = {id(x) for x in held_arrays(state)}
     left_out = {name for name, x in zip(state._fields, state, strict=True) if id(x) not in held}
     # `parts` are addresses of machine code, the same for all worlds of a process.
-    assert left_out <= {"w", "signals", "parts"}
+    assert left_out <= {"w", "signals", "parts", "radau"}
+    assert {id(x) for x in state.radau.values} <= held
 
 
 @pytest.mark.parametrize(
