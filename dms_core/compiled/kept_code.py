@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import pickle
+import warnings
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -135,8 +136,9 @@ class _File(IndexDataCacheFile):
         super().save(key, data)
 
     def _load_index(self) -> dict[Any, str]:
-        # An index that is damaged, or that cannot be read, holds nothing.
-        with contextlib.suppress(Exception):
+        # An index that is damaged, cannot be read, or names modules as they were before a move holds nothing.
+        with contextlib.suppress(Exception), warnings.catch_warnings():
+            warnings.simplefilter("error", FutureWarning)
             return super()._load_index()
         return {}
 

@@ -134,6 +134,11 @@ class Patient(Person):
         "extensors minus it; healthy from the stiffness of elbows that hold [Gomi 1998] and move "
         "[Bennett 1993], after stroke assumed",
     )  # fmt: skip
+    feedback_scaling: float = trait(
+        0.0, ge=0.0, le=50.0, unit="1/rad", acts="effort", neutral=True,
+        description="further gain per activity [1/rad]: that of the reflex rises with the motor discharge there is "
+        "[Matthews 1986], and the stiffness of an elbow that holds with its torque [Gomi 1998]; after stroke assumed",
+    )  # fmt: skip
     feedback_delay: float = trait(
         0.06, ge=0.0, le=LONGEST_DELAY, unit="s", acts="effort",
         description="its latency [s]; 50 to 60 ms [Hammond 1955]",

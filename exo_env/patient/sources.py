@@ -60,6 +60,11 @@ SOURCES = {
     "Matthews 1981": Source(
         "J. Physiol. 320:1-30", "muscle spindles report length and rate", "all of it; a review of the field"
     ),
+    "Matthews 1986": Source(
+        "J. Physiol. 374:73-90",
+        "elbow flexors: the gain of the reflex rises with the motor discharge before the stretch",
+        "all of it; the title says so",
+    ),
     "McPherson 2018": Source(
         "Exp. Brain Res. 237:121-135", "elbow stretch reflex in hemiparesis, stretches of 15 to 150 deg/s"
     ),

@@ -37,15 +37,20 @@ def put_preview(w, place):
 
 
 @compiled
-def judge_elbow(w):
-    """Check the limits, then fill the reward terms of rewards.py, which are the first of the task's."""
+def judge_elbow(w, width):
+    """Check the limits, then fill the reward terms of rewards.py, which are the first of the task's.
+
+    Args:
+        w: the world.
+        width: error that earns 1/e [rad].
+    """
     r, at, plan, drive = readings(w), first_of(w), inner(w, WORLD.plan), inner(w, WORLD.drive)
     reaction = r[at[ELBOW.reaction]]
     tensions = r[at[ELBOW.tension] : at[ELBOW.muscle_moment]]
     if event_of(w) == NOTHING:
         end_with(w, exceeded(task_numbers(w), r[at[ELBOW.angle]], tensions, reaction))
     term_values(
-        r[at[ELBOW.error]], r[at[ELBOW.exo_moment]], lacking_of(w), floats(plan, PLAN.scale)[0], reaction,
+        r[at[ELBOW.error]], width, r[at[ELBOW.exo_moment]], lacking_of(w), floats(plan, PLAN.scale)[0], reaction,
         floats(drive, DRIVE.action), floats(drive, DRIVE.before), event_of(w) != NOTHING, terms_of(w),
     )  # fmt: skip
 

@@ -25,7 +25,7 @@ from exo_env.tasks.elbow import (
     read_elbow,
 )
 from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
-from exo_env.tasks.judgement.intent_rewards import INTENT_TERM, IntentWeights, opposing_power, opposition
+from exo_env.tasks.judgement.intent_rewards import INTENT_TERM, INTENT_WIDTH, IntentWeights, opposing_power, opposition
 from exo_env.tasks.movements.intentions import Intentions
 from exo_env.tasks.movements.movement import Movement
 from exo_env.tasks.observation.channels import Channel, Imperfection, Parts, Reading
@@ -80,7 +80,7 @@ def read_intent(w):
 @compiled
 def judge_intent(w):
     """Check the limits, then fill the reward terms of intent_rewards.py."""
-    judge_elbow(w)
+    judge_elbow(w, INTENT_WIDTH)
     power = readings(w)[first_of(w)[INTENT.opposing_power]]
     terms_of(w)[INTENT_TERM.opposition] = opposition(power, floats(inner(w, WORLD.plan), PLAN.scale)[0])
 

@@ -18,7 +18,7 @@ from exo_env.tasks.elbow import (
     read_elbow,
 )
 from exo_env.tasks.elbow_task import PREVIEW, ElbowTask, judge_elbow, put_preview
-from exo_env.tasks.judgement.rewards import Weights
+from exo_env.tasks.judgement.rewards import TRACKING_WIDTH, Weights
 from exo_env.tasks.movements.movement import Movement
 from exo_env.tasks.movements.repetition import Repetitions
 from exo_env.tasks.observation.channels import Channel, Parts, Reading
@@ -42,6 +42,12 @@ def _read(w):
     put_preview(w, first_of(w)[LIFT.preview])
 
 
+@compiled
+def _judge(w):
+    """Check the limits, and fill the reward terms of rewards.py."""
+    judge_elbow(w, TRACKING_WIDTH)
+
+
 class LiftTask(ElbowTask):
     """The task: follow the reference, and let the patient do what the patient can."""
 
@@ -53,7 +59,7 @@ class LiftTask(ElbowTask):
         Reported("effort", "effort"),
         Reported("elbow_reaction", "reaction"),
     )
-    read, judge = _read, judge_elbow
+    read, judge = _read, _judge
 
     def declared_readings(self, parts: Parts) -> list[Reading]:
         """The readings of `lift_readings`."""

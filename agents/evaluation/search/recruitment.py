@@ -1,10 +1,12 @@
 """How much work errors of a size can recruit from a patient: a linear estimate, whatever device makes the errors.
 
-Effort obeys s' = -rate (s - s_0) + recovery e (slacking.py), and beside it intention grows by feedback_gain e
-(effort.py). With p, the power of the planned moment, and g, that of all flexors at full activation, both along the
-reference and where they are positive, an error e adds to the patient's work in a run with the error e_0
+Effort obeys s' = -rate (s - s_0) + recovery e (slacking.py), and beside it intention grows by
+(feedback_gain + feedback_scaling A) e (effort.py), A being p / g at most. With p, the power of the planned moment, and
+g, that of all flexors at full activation, both along the reference and where they are positive, an error e adds to the
+patient's work in a run with the error e_0
 
-    W = integral of k (e - e_0) dt,   k(t) = feedback_gain g(t) + recovery integral of p(u) exp(-rate (u - t)) du, u > t
+    W = integral of k (e - e_0) dt,   k(t) = feedback_gain g(t) + feedback_scaling p(t)
+                                                + recovery integral of p(u) exp(-rate (u - t)) du, u > t
 
 Of all errors whose root mean square over the time T is R, the one in proportion to k adds most (Cauchy and Schwarz):
 
@@ -74,4 +76,4 @@ def recruited(patient: Patient, planned: np.ndarray, full: np.ndarray, period: f
     for i in reversed(range(len(planned))):
         later = later * kept + planned[i] * gained
         recovered[i] = later
-    return patient.effort_recovery * recovered + patient.feedback_gain * full
+    return patient.effort_recovery * recovered + patient.feedback_gain * full + patient.feedback_scaling * planned

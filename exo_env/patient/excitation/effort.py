@@ -2,7 +2,8 @@
 
 For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activations a_k of the motor command:
 
-    c_k = delayed(s a_k, neural delay) + sign feedback_gain y^                             what is intended, at least 0
+    c_k = delayed(s a_k, neural delay) + sign (feedback_gain + feedback_scaling A) y^      what is intended, at least 0
+    A = mean(maximum_activation M_A) / (1 + (psi' / 1 rad/s)^2)                            of the group with more of it
     T_k = (c_k + co_contraction mean(c of the other group)) / maximum_activation_g         wanted share, at most 1,
           with c of the other group up to its maximum_activation
     d_k = maximum_activation_g min(T_k, 1 - M_F,k)                                         voluntary drive
@@ -10,12 +11,13 @@ For muscle k of group g (flexors: sign +1, extensors: -1), with the wanted activ
           + sign tremor_amplitude sin(phase)                                               tremor
     u_k = delayed(d_k, electromechanical delay), within 0.01 to 1
 
-s is the effort (slacking.py), M_F the fatigued share (fatigue.py), y^ the error with its lead, which is felt late and
-predicted from there to now (forward_model.py). Weakness is a ceiling, since what was measured after stroke is the
-largest torque: who is weak wants a larger share of what is left for the same moment, and gives it up to all of it. That
-patients know their weakness so well is assumed; the rest of it they learn by their errors (s above 1). Weakness is of
-the descending command: reflex and tremor know no ceiling. Tremor alternates between the groups and its phase wanders
-with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a spectral peak of that width at half height.
+s is the effort (slacking.py), A the activity of who holds, M_A and M_F the active and the fatigued share (fatigue.py),
+y^ the error with its lead, which is felt late and predicted from there to now (forward_model.py). Weakness is a
+ceiling, since what was measured after stroke is the largest torque: who is weak wants a larger share of what is left
+for the same moment, and gives it up to all of it. That patients know their weakness so well is assumed; the rest of it
+they learn by their errors (s above 1). Weakness is of the descending command: reflex and tremor know no ceiling. Tremor
+alternates between the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a
+spectral peak of that width at half height.
 
 A patient acts every TICK, whatever the control rate of the device is: 50 times a second, which few motor units of the
 biceps exceed in the strongest contractions (31 +- 10 Hz, Bellemare et al. 1983, J. Neurophysiol. 50:1380-1392), so that
@@ -43,6 +45,9 @@ from exo_env.patient.excitation.stretch_reflex import stretch_reflex
 from exo_env.patient.patient import LONGEST_DELAY, PATIENT
 from exo_env.places import places
 
+HOLDING = 1.0
+"""Planned rate at which half of the gain by activity is left [rad/s]: an elbow that moves is softer than one that holds
+(Bennett 1993); chosen so that it stays within the stiffness measured there."""
 TICK = 0.02
 """Time from one act of a patient to the next [s]."""
 
@@ -125,7 +130,13 @@ def felt(ring, k, newest, delay, period):
 
 
 @compiled
-def feedback(par, state, period):
+def largest_activation(par, sign):
+    """maximum_activation_g of a muscle's group [-]."""
+    return par[PATIENT.maximum_activation_flexors if sign > 0.0 else PATIENT.maximum_activation_extensors]
+
+
+@compiled
+def feedback(par, state, planned_rate, period):
     """Excitation of the flexors by the error [-]: as it is felt, and predicted from there to the end of the period."""
     newest, delay = int(state.present[PRESENT.newest]), par[PATIENT.feedback_delay]
     error, share = felt(state.error, 0, newest, delay, period), par[PATIENT.prediction]
@@ -133,7 +144,22 @@ def feedback(par, state, period):
         # What the model expects is known at the end of the period.
         then = delayed(state.expected, 0, newest, max(delay / period, 1.0))
         error -= share * (state.expected[0, newest] - then)
-    return par[PATIENT.feedback_gain] * error
+    more = par[PATIENT.feedback_scaling] * activity(par, state, planned_rate)
+    return (par[PATIENT.feedback_gain] + more) * error
+
+
+@compiled
+def activity(par, state, planned_rate):
+    """A: mean activity of the group that has more of it, less where the plan moves [-]."""
+    most = 0.0
+    for sign in (1.0, -1.0):
+        total, count = 0.0, 0
+        for k in range(state.sign.shape[0]):
+            if state.sign[k] == sign:
+                total += largest_activation(par, sign) * state.active[k]
+                count += 1
+        most = max(most, total / max(count, 1))
+    return most / (1.0 + (planned_rate / HOLDING) ** 2)
 
 
 @compiled
@@ -145,12 +171,6 @@ def put_intents(par, state, period, correction):
         command = delayed(state.command, k, newest, late)
         intents[0, k] = max(command, 0.0)
         intents[1, k] = max(command + state.sign[k] * correction, 0.0)
-
-
-@compiled
-def largest_activation(par, sign):
-    """maximum_activation_g of a muscle's group [-]."""
-    return par[PATIENT.maximum_activation_flexors if sign > 0.0 else PATIENT.maximum_activation_extensors]
 
 
 @compiled
@@ -241,7 +261,7 @@ def step_effort(par, state, period, wanted, error, error_rate, angle, rate, nois
     )  # fmt: skip
     remember(par, state, period, wanted, error, error_rate, angle, rate)
     newest, predicts = int(present[PRESENT.newest]), par[PATIENT.prediction] > 0.0
-    put_intents(par, state, period, feedback(par, state, period))
+    put_intents(par, state, period, feedback(par, state, error_rate + rate, period))
     turn, corrected = 2.0 * math.pi * par[PATIENT.tremor_frequency] * period, 0.0
     tremor = par[PATIENT.tremor_amplitude] * math.sin(present[PRESENT.phase] + turn)
     for k in range(state.sign.shape[0]):

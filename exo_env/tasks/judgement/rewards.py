@@ -35,7 +35,7 @@ from exo_env.places import places
 from exo_env.settings import Settings
 
 TRACKING_WIDTH = math.radians(5.0)
-"""Error that earns 1/e [rad]."""
+"""Error from a shown reference that earns 1/e [rad]."""
 REACTION_THRESHOLD, MOST = 500.0, 2.0
 """Reaction above which it costs [N], and the largest cost of assistance and reaction [-]."""
 
@@ -55,11 +55,12 @@ TERM = places(Weights.model_fields)
 
 
 @compiled
-def term_values(error, moment, lacking, scale, reaction, action, before, unsafe, out):
+def term_values(error, width, moment, lacking, scale, reaction, action, before, unsafe, out):
     """Value of each term [-], at the places of TERM.
 
     Args:
         error: elbow angle minus reference [rad].
+        width: error that earns 1/e [rad].
         moment: moment of the exoskeleton, flexion positive [Nm].
         lacking: what the patient cannot give, at least 0 [Nm].
         scale: mean moment that the movement needs [Nm].
@@ -72,7 +73,7 @@ def term_values(error, moment, lacking, scale, reaction, action, before, unsafe,
     change = 0.0
     for i in range(action.shape[0]):
         change += (action[i] - before[i]) ** 2
-    out[TERM.tracking] = math.exp(-((error / TRACKING_WIDTH) ** 2))
+    out[TERM.tracking] = math.exp(-((error / width) ** 2))
     out[TERM.assistance] = -min(max(moment - lacking, -moment, 0.0) / scale, MOST)
     out[TERM.smoothness] = -0.25 * change / action.shape[0]
     out[TERM.reaction] = -min(max(reaction / REACTION_THRESHOLD - 1.0, 0.0), MOST)

@@ -16,9 +16,7 @@ Published, at the elbow:
                  8.3 Nm s/rad, beside 25 Nm/rad: Viviani, Soechting and Terzuolo 1976, J. Physiol. (Paris) 72:45
 
 People differ, and do as they are told, to resist or to let go: a factor of two is allowed around a published line, and
-nothing beyond the limits of a published range. An elbow that holds becomes stiffer with its torque, the simulated one
-does not: a fibre of Thelen's curves has no short-range stiffness, and one gain of feedback serves rest and movement. It
-was chosen for movements and light loads; under heavier ones the elbow is too soft, and a test says so.
+nothing beyond the limits of a published range.
 """
 
 from __future__ import annotations
@@ -47,7 +45,7 @@ LIGHT = 0.05
 def middle():
     """The feedback of a healthy person in the middle of the population."""
     drawn = population("healthy").distributions
-    names = ("feedback_gain", "feedback_lead", "feedback_delay", "prediction")
+    names = ("feedback_gain", "feedback_scaling", "feedback_lead", "feedback_delay", "prediction")
     return Patient(**{name: float(np.mean(drawn[name].limits())) for name in names})
 
 
@@ -78,19 +76,11 @@ def held(load, **changed):
     return against[late].mean() / angle[late].mean(), before
 
 
-def test_stiffness_of_an_elbow_that_holds():
-    stiffness, torque = held(LIGHT)
-    assert torque == pytest.approx(3.4, abs=0.1)
-    assert 0.5 < stiffness / (8.67 + 6.18 * torque) < 2.0, stiffness
-
-
-@pytest.mark.parametrize(("load", "torque", "share"), [(1.0, 6.3, 0.45), (3.0, 12.3, 0.21)])
-def test_under_a_load_the_elbow_is_softer_than_published(load, torque, share):
-    """What is known to be missing; who models short-range stiffness makes this fail, and the sentence above wrong."""
+@pytest.mark.parametrize(("load", "torque"), [(LIGHT, 3.4), (1.0, 6.3), (3.0, 12.3)])
+def test_stiffness_of_an_elbow_that_holds(load, torque):
     stiffness, before = held(load)
     assert before == pytest.approx(torque, abs=0.1)
-    # To the last digit given.
-    assert stiffness / (8.67 + 6.18 * before) == pytest.approx(share, abs=0.03), stiffness
+    assert 0.5 < stiffness / (8.67 + 6.18 * before) < 2.0, stiffness
 
 
 @pytest.mark.parametrize("duration", [0.6, 1.0])
@@ -108,7 +98,7 @@ def test_stiffness_of_an_elbow_that_moves(duration):
 @pytest.mark.parametrize("load", [LIGHT, 1.0, 3.0])
 def test_damping_and_stiffness_before_anything_is_felt(load):
     """Of the muscles alone: damping within the published values, and little stiffness."""
-    still = middle().changed(feedback_gain=0.0)
+    still = middle().changed(feedback_gain=0.0, feedback_scaling=0.0)
     angle, rate, against, _ = step(still, load, HOLD, 0.05, 0.5, 0.5)
     early = slice(0, LATE)
     damping = (against[early] @ rate[early]) / (rate[early] @ rate[early])
@@ -120,4 +110,4 @@ def test_damping_and_stiffness_before_anything_is_felt(load):
 
 def test_feedback_makes_the_stiffness():
     """What is measured above is not the device's: without feedback there is next to none."""
-    assert abs(held(LIGHT, feedback_gain=0.0)[0]) < 3.0
+    assert abs(held(LIGHT, feedback_gain=0.0, feedback_scaling=0.0)[0]) < 3.0

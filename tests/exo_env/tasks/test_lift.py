@@ -23,7 +23,8 @@ def test_reward_is_the_sum_of_its_terms(env):
 
 
 def _terms(**changed):
-    quiet = {"error": 0.0, "moment": 0.0, "lacking": 1.0, "scale": 4.0, "reaction": 400.0, "action": HOLD,
+    quiet = {"error": 0.0, "width": math.radians(5.0), "moment": 0.0, "lacking": 1.0, "scale": 4.0,
+             "reaction": 400.0, "action": HOLD,
              "before": HOLD, "unsafe": False}  # fmt: skip
     out = np.zeros(len(TERM))
     term_values(*(quiet | changed).values(), out)
