@@ -209,8 +209,9 @@ class TestFibres:
         assert least < fibre[-1] < least + 1e-3 and abs(run.own_steps().rate(name)[-1]) < 1e-6
         (flag,) = run.flags
         assert flag.element == "biceps" and "smallest length" in flag.sentence and flag.unit == "m"
-        # From 0.05 m, at 1 m/s at most.
-        assert 0.02 < flag.first < 0.5 and flag.total == pytest.approx(0.5 - flag.first, abs=5e-3)
+        # From 0.05 m, at 1 m/s at most; radau5 has longer steps, in which the stop is met somewhere.
+        slack = 5e-3 if options.method == "radau5" else 2e-3
+        assert 0.02 < flag.first < 0.5 and flag.total == pytest.approx(0.5 - flag.first, abs=slack)
 
     def test_it_leaves_the_stop_when_the_tendon_pulls(self):
         """The path grows from 0.3 to 0.36 m within a second: the tendon becomes taut and stretches the fibre again."""
