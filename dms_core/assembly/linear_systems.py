@@ -28,6 +28,8 @@ TYPICAL_C0 = 1.5e3
 NEARBY_STATES, NEARBY = 6, 0.1
 """Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
 
+JOLT = 100.0
+"""Accelerations over nominal rates [1/s] at which an order is tried for a matrix that was singular within a step."""
 VANISHING = 1e-3
 """Least size of an entry over those states, relative to one of them, below which it is no pivot."""
 
@@ -127,7 +129,13 @@ class Sampling(NamedTuple):
 
 
 def ordered_systems(
-    where: Sampling, q: np.ndarray, v: np.ndarray, t: float, c0: float = TYPICAL_C0, quick: bool = False
+    where: Sampling,
+    q: np.ndarray,
+    v: np.ndarray,
+    t: float,
+    c0: float = TYPICAL_C0,
+    quick: bool = False,
+    jolt: float = 0.0,
 ) -> OrderedSystems:
     """Scatter and elimination orders of both systems, from their values at and near q, v, shape (n_q,), at time t.
 
@@ -150,13 +158,13 @@ def ordered_systems(
         newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
     ).best_order(_samples(
         layout, work, free, len(slots.number),
-        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, c0, x),
+        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, c0, x), jolt,
     ), quick)  # fmt: skip
     rates, slots = rate_pattern(layout, free, solved)
     packed_rates = Packed(rates)
     rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*moving, *rows]).best_order(_samples(
         layout, work, free, len(slots.number),
-        lambda x: evaluate_rates(dynamics.table, constraints.table, packed_rates.table, w.table, x),
+        lambda x: evaluate_rates(dynamics.table, constraints.table, packed_rates.table, w.table, x), jolt,
     ), quick)  # fmt: skip
     return OrderedSystems(newton, newton_lu, rates, rate_lu)
 
@@ -168,9 +176,12 @@ def nominal_sizes(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _samples(
-    layout: Layout, work: Work, free: np.ndarray, size: int, evaluate: Callable[[np.ndarray], None]
+    layout: Layout, work: Work, free: np.ndarray, size: int, evaluate: Callable[[np.ndarray], None], jolt: float = 0.0
 ) -> list[np.ndarray]:
-    """Matrix entries at the state in `work` and at nearby ones, where they are finite."""
+    """Matrix entries at the state in `work` and at nearby ones, where they are finite.
+
+    Nearby states have accelerations of the size of `jolt` times nominal rates, at which commands saturate.
+    """
     scale_q, scale_v = nominal_sizes(layout)
     q, v, rng = work.q.copy(), work.v.copy(), np.random.default_rng(0)
     samples = []
@@ -179,8 +190,11 @@ def _samples(
         if k > 0:
             work.q[free] = q[free] + NEARBY * scale_q[free] * rng.normal(size=len(free))
             work.v[free] = v[free] + scale_v[free] * rng.normal(size=len(free))
+            if jolt:
+                work.a[free] = jolt * scale_v[free] * rng.normal(size=len(free))
         evaluate(values)
         if k == 0 or np.isfinite(values).all():
             samples.append(values)
     work.q[:], work.v[:] = q, v
+    work.a[:] = 0.0
     return samples

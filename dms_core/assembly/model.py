@@ -12,7 +12,7 @@ from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
 from dms_core.assembly.layout import Call, Layout, same_structure
-from dms_core.assembly.linear_systems import TYPICAL_C0, Sampling, nominal_sizes, ordered_systems
+from dms_core.assembly.linear_systems import JOLT, TYPICAL_C0, Sampling, nominal_sizes, ordered_systems
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
@@ -148,7 +148,9 @@ class Model:
         """Constant tables (a packed Tables) for the compiled solver."""
         return self._tables
 
-    def reordered(self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0) -> Packed:
+    def reordered(
+        self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0, nearby: bool = False
+    ) -> Packed:
         """Tables with independent rows and elimination orders chosen anew at a state.
 
         Args:
@@ -157,6 +159,7 @@ class Model:
             t: time [s].
             signals: inputs.
             c0: leading coefficient of the step [1/s] that the order is for.
+            nearby: look at nearby states too, as for the first order; that takes longer.
 
         Raises:
             ModelError: the equations are singular there.
@@ -164,7 +167,7 @@ class Model:
         G = self.jacobian(q, v, t)[2][self._moving_rows][:, self.welds.free]
         # Along the motion rows are closed to a tolerance only, within which those that depend on others seem not to.
         found = self._moving_rows[independent_rows(G, MOVED_TOLERANCE, len(self.welds.solved)).independent]
-        return Packed(self._order(found, q, v, t, signals, c0, True))
+        return Packed(self._order(found, q, v, t, signals, c0, not nearby, JOLT if nearby else 0.0))
 
     @cached_property
     def _moving_rows(self) -> np.ndarray:
@@ -187,14 +190,15 @@ class Model:
 
     def _order(
         self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0,
-        quick: bool = False,
+        quick: bool = False, jolt: float = 0.0,
     ) -> Tables:  # fmt: skip
         """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t."""
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
-        systems = ordered_systems(Sampling(layout, dynamics, constraints, signals, free, solved), q, v, t, c0, quick)
+        where = Sampling(layout, dynamics, constraints, signals, free, solved)
+        systems = ordered_systems(where, q, v, t, c0, quick, jolt)
         return Tables(
             dynamics, constraints, self._sensors.values, *systems, free, solved, self.second_order,
             *nominal_sizes(layout), sum(len(c.iu) > 0 for c in layout.constraints),

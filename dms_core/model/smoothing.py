@@ -7,7 +7,6 @@ Both passes together fall to 1 / sqrt 2 at the stated cut-off: each is designed 
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from dms_core.errors import InputError
 
@@ -32,6 +31,9 @@ def low_pass(times: np.ndarray, values: np.ndarray, cutoff: float, what: str) ->
     Raises:
         InputError: the times are not even, too few, or too far apart for that frequency.
     """
+    # Late, since it takes a second that whoever filters nothing does not have to wait.
+    from scipy.signal import butter, sosfiltfilt
+
     steps = np.diff(times)
     if len(times) < FEWEST:
         raise InputError(f"{what}: Expected at least {FEWEST} rows to filter, got {len(times)}.")

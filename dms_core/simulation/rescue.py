@@ -49,7 +49,8 @@ class Rescue(Inspection):
             if not asked or usual in tried:
                 return asked and self._shorten()
             tried.add(usual)
-            return self.reorder() or self._shorten()
+            # A command that saturates within the step leaves no pivot where the present state shows one.
+            return self.reorder(nearby=True) or self._shorten()
         tried.add(place)
         weak = clock[CLOCK.pivot] < WEAK * clock[CLOCK.best_pivot]
         clock[CLOCK.best_pivot] = 0.0
@@ -64,17 +65,18 @@ class Rescue(Inspection):
             self.state.counts[COUNTS.restart] = 1
         return self.reorder(c0 if asked or self.options.fixed_step else TYPICAL_C0) or usable
 
-    def reorder(self, c0: float = TYPICAL_C0) -> bool:
+    def reorder(self, c0: float = TYPICAL_C0, nearby: bool = False) -> bool:
         """Choose rows and pivots anew where the old ones are, or soon will be, singular; False if nothing helps.
 
         The motion goes on as it was: the multipliers of the new rows exert the force of the old ones.
 
         Args:
             c0: leading coefficient of the step [1/s] that the order is for.
+            nearby: look at nearby states too.
         """
         s, before = self.state, self._tables.values.active
         try:
-            self._tables = self.model.reordered(s.q, s.v, self.time, s.signals, c0)
+            self._tables = self.model.reordered(s.q, s.v, self.time, s.signals, c0, nearby)
         except ModelError as error:
             self._singular = str(error)
             return False

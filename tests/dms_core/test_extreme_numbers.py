@@ -31,7 +31,7 @@ from tests.example_elements import examples
 
 VALUES = (0.0, -1.0, 1e-300, -1e-300, SMALLEST, 1e-12, 1e12, 1e16, -1e16, LARGEST, -LARGEST, 1e300, -1e300)
 QUICK = (0.0, -1.0, 1e-300, 1e-12, 1e16, -LARGEST, 1e300)
-OPTIONS = SolverOptions(max_steps=40)
+OPTIONS = SolverOptions(max_steps=400)
 T_END = 1e-3
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.contact.law import contact_force, contact_force_change, normal_force
-from dms_core.model.contact.shapes import BODY_I, BODY_J, CONTACT, touch, touch_change, unit_change
+from dms_core.model.contact.shapes import BODY_I, BODY_J, CONTACT, touch_change, touching, unit_change
 from dms_core.model.geometry.rotations import add, cross, dot, euler_parameters, scale, sub, vec
 
 SLOWEST_IMPACT = 1e-3
@@ -117,7 +117,7 @@ def _put_force(out, q, X, F):
 def contact(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: shape, has an impact speed from an input."""
     shape, friction, slip_speed = ip[0], par[CONTACT.friction], par[CONTACT.slip_speed]
-    g, n, X = touch(shape, par, q)
+    g, n, X = touching(shape, par, q)
     if g >= 0.0:
         return
     w = relative_velocity(q, v, X)
@@ -144,7 +144,7 @@ def contact(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
 @compiled
 def contact_by_input(ip, par, q, v, a, u, Ju):
     """The rows by the speed of the impact, on which the damping depends."""
-    g, n, X = touch(ip[0], par, q)
+    g, n, X = touching(ip[0], par, q)
     if ip[1] == 0 or g >= 0.0:
         return
     w = relative_velocity(q, v, X)

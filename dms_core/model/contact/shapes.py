@@ -52,7 +52,7 @@ CONTACT = ContactNumbers()
 
 
 @compiled
-def touch(shape, par, q):
+def touching(shape, par, q):
     """(g, n, X)."""
     s_i, c = vec(par, CONTACT.s_i), point(q, BODY_J, vec(par, CONTACT.s_j))
     P, R = point(q, BODY_I, s_i), par[CONTACT.radius]

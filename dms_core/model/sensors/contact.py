@@ -18,7 +18,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.model.contact.contact import Contact
 from dms_core.model.contact.kernel import damping_of, input_change, relative_velocity, velocity_changes
 from dms_core.model.contact.law import normal_force, slip_change, slip_of
-from dms_core.model.contact.shapes import CONTACT, touch, touch_change
+from dms_core.model.contact.shapes import CONTACT, touch_change, touching
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.geometry.rotations import dot
 
@@ -27,7 +27,7 @@ from dms_core.model.geometry.rotations import dot
 def contact_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """Tables of the contact."""
     damping, mu = damping_of(ip, par, u), par[CONTACT.friction]
-    g, n, X = touch(ip[0], par, q)
+    g, n, X = touching(ip[0], par, q)
     w = relative_velocity(q, v, X)
     N, by_depth, by_rate = normal_force(par[CONTACT.stiffness], damping, -g, -dot(n, w))
     slip, size = slip_of(par[CONTACT.slip_speed], n, w)

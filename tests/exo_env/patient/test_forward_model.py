@@ -125,6 +125,7 @@ def unrest(patients, **changed):
 def test_high_gains_are_steady_with_prediction_only():
     """At six times the gain of the strongest healthy person, where third differences were 499 and 102 rad/s^3."""
     (wild, shaky), (calm, steady) = (
-        unrest(20, feedback_gain=3.0, feedback_lead=0.05 * share, prediction=share) for share in (0.0, 1.0)
+        unrest(20, feedback_gain=3.0, feedback_scaling=0.0, feedback_lead=0.05 * share, prediction=share)
+        for share in (0.0, 1.0)
     )
     assert calm <= wild and steady < 0.4 * shaky
