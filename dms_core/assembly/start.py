@@ -104,10 +104,16 @@ def _closed(layout: Layout, jacobian: Jacobian, q: np.ndarray, name: str) -> np.
             )
         raise AssemblyError(
             f"system '{name}' cannot be assembled: constraint '{row}' stays open by {gap:.3g} (m or -) "
-            "after least-squares assembly. Check the lengths of that loop, or declare start poses nearer to the "
-            "closed one."
+            f"after least-squares assembly. Check the lengths and axes of that loop, which are those of "
+            f"{_loop_of(layout, G, row)}, or declare start poses nearer to the closed one."
         )
     return q
+
+
+def _loop_of(layout: Layout, G: np.ndarray, row: str) -> str:
+    """Names of the joints that are linked with a row."""
+    linked = _linked(G, np.array([name == row for name in layout.row_names])).astype(float)
+    return quoted(joints_of(layout, linked))
 
 
 def _warn_of_moved_bodies(layout: Layout, declared: np.ndarray, q: np.ndarray, G: np.ndarray) -> None:

@@ -91,7 +91,7 @@ class ThelenCurves(Checked):
     """Shape parameters. The defaults are Thelen's young adult, which are OpenSim's class defaults too."""
 
     wrong: ClassVar[type[DmsError]] = ModelError
-    tendon_strain: float = Field(default=0.04, gt=0.0, description="tendon strain e0T at maximum isometric force [-]")
+    tendon_strain: float = Field(default=0.04, ge=1e-6, description="tendon strain e0T at maximum isometric force [-]")
     passive_strain: float = Field(default=0.6, gt=0.0, description="fibre strain e0M at which passive force is F0 [-]")
     active_shape: float = Field(default=0.45, gt=0.0, description="width gamma of the active curve [-]")
     passive_shape: float = Field(default=5.0, gt=0.0, description="exponent kPE of the passive curve [-]")
