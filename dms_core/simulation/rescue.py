@@ -80,6 +80,7 @@ class Rescue(Inspection):
         except ModelError as error:
             self._singular = str(error)
             return False
+        self._singular = ""
         rows = self._tables.values.active
         if not np.array_equal(rows, before):
             kept = np.array([s.lam, s.lam_before, s.mu])

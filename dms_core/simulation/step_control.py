@@ -221,7 +221,9 @@ def one_step(m, s, o, stop, kept):
         code, iterations, error, c0 = try_step(m, s, o, h, started)
         if code == NEWTON.singular:
             return OUTCOME.matrix_singular
-        if code == NEWTON.converged and (error <= (SINGULAR_ERROR if nearly_singular(s) else 1.0) or fixed):
+        # A step of Radau IIA that erred is not finished: nothing of it can be taken.
+        passing = nearly_singular(s) and o.method != METHOD.radau5
+        if code == NEWTON.converged and (error <= (SINGULAR_ERROR if passing else 1.0) or fixed):
             break
         failures += 1
         if (code != NEWTON.converged and (fixed or failures > 1) and ordered_for_another_size(m, s)) or (
