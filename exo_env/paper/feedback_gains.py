@@ -1,8 +1,7 @@
 """Patients alone at several gains of feedback, as it is felt and as it is predicted: who ends unsafe, who keeps up.
 
 A gain on what is felt late makes the arm swing; with a forward model (excitation/forward_model.py) it is steady.
-Other traits are those that each patient has drawn. An elbow that comes below 0 deg counts apart: an arm that nobody
-holds hangs straight.
+Other traits are those that each patient has drawn. An elbow that ends below the lowest angle allowed counts apart.
 
     python -m exo_env.paper.feedback_gains > docs/feedback_gains.csv
 """

@@ -19,13 +19,13 @@ they learn by their errors (s above 1). Weakness is of the descending command: r
 alternates between the groups and its phase wanders with 2 pi frequency dt + sqrt(2 pi width dt) N(0, 1), which makes a
 spectral peak of that width at half height.
 
-A patient acts every TICK, whatever the control rate of the device is: 50 times a second, which few motor units of the
-biceps exceed in the strongest contractions (31 +- 10 Hz, Bellemare et al. 1983, J. Neurophysiol. 50:1380-1392), so that
-a muscle is told nothing new in between. The quickest reflex of the elbow is as late as one tick. Signals are linear
-between ticks, and so is the excitation that reaches the muscles. The motor command is known beforehand and taken at the
-end of the tick; what is felt (error, stretch) is known at its beginning, so that a delay shorter than a tick counts as
-one. A patient is a row of numbers (`PATIENT` in patient.py) and an `EffortState`; the functions neither allocate nor
-draw random numbers, so that a batch can run them.
+A patient acts every TICK, whatever the control rate of the device is: 50 times a second, of the order of the fastest
+firing of single units (31 +- 10 Hz, Bellemare et al. 1983, J. Neurophysiol. 50:1380-1392); a muscle, whose units fire
+at different times, is told more than that, which activation filters. The quickest reflex of the elbow is as late as one
+tick. Signals are linear between ticks, and so is the excitation that reaches the muscles. The motor command is known
+beforehand and taken at the end of the tick; what is felt (error, stretch) is known at its beginning, so that a delay
+shorter than a tick counts as one. A patient is a row of numbers (`PATIENT` in patient.py) and an `EffortState`; the
+functions neither allocate nor draw random numbers, so that a batch can run them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
 """The reward of assistance without a reference: the terms of rewards.py about the patient's plan, and one more.
 
     tracking     exp(-(e / 10 deg)^2), e how far the arm is from where the patient wants it, psi
-                 Nobody but the patient knows psi, so what counts is what the patient can tell. People who put a forearm
-                 back where it was are off by up to 10.7 deg in the mean, the limit of those without impairment, within
-                 which 17 of 18 people after stroke stayed (Gurari, Drogos and Dewald 2018, PLoS ONE 13:e0206518).
+                 Nobody but the patient knows psi, and the width is assumed, about as large as errors of position
+                 sense: the upper limit of the mean error of people without impairment who put the forearm back where
+                 it was is 10.7 deg, and 17 of 18 people after stroke stayed below it (Gurari, Drogos and Dewald 2018,
+                 PLoS ONE 13:e0206518). Half of the help of a device that does all for somebody who needs nothing
+                 costs as much as an error of 6.9 deg.
     assistance   help beyond what this patient lacks; as in rewards.py
     smoothness, reaction, unsafe      as in rewards.py
     opposition   -min(P / (mean M_need 1 rad/s), 2),  P = max(M_exo - max(M_need, 0), 0) max(-psi', 0)
