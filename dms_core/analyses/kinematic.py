@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dms_core.analyses.driven_inputs import check_drives_nothing
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.assembly.blocks import OperatingPoint
 from dms_core.assembly.model import Model
@@ -101,10 +102,11 @@ class Driven:
         model: a compiled model.
 
     Raises:
-        ModelError: a freedom has no driver, or two drivers determine the same one.
+        ModelError: a freedom has no driver, two drivers determine the same one, or an element drives an input.
     """
 
     def __init__(self, model: Model) -> None:
+        check_drives_nothing(model, "states of elements do not follow from positions")
         self.model = model
         bodies = sum(len(body.coordinates()) for body in model.system.bodies)
         self.moving = np.arange(bodies)
@@ -176,7 +178,8 @@ def kinematic(
 
     Raises:
         InputError: times do not rise, begin before 0, or are more than memory holds the motion of.
-        ModelError: a driver is missing, or two drive the same coordinate; names the motion or the drivers.
+        ModelError: a driver is missing, or two drive the same coordinate; names the motion or the drivers. An element
+            drives an input, which would be 0; names both.
 
     Example:
         >>> result = kinematic(model, np.linspace(0.0, 2.0, 201)).check()

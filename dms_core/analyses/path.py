@@ -218,6 +218,7 @@ def follow_path(
 
     Raises:
         InputError: no load is named, one does not exist, or a number is out of range.
+        ModelError: an element reads a sensor or drives an input.
         SimulationError: there is no equilibrium to begin with.
 
     Example:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.analyses.driven_inputs import check_drives_nothing, check_reads_nothing
 from dms_core.assembly.blocks import Blocks, OperatingPoint
 from dms_core.assembly.input_derivatives import STEP
 from dms_core.assembly.layout import Call
@@ -100,6 +101,7 @@ class RestEquations:
 
     Raises:
         InputError: a load is neither an input nor a force without coordinates, or a value is not finite.
+        ModelError: an element reads a sensor or drives an input.
     """
 
     def __init__(
@@ -109,6 +111,8 @@ class RestEquations:
         time: float = 0.0,
         inputs: dict[str, float] | None = None,
     ) -> None:
+        check_reads_nothing(model)
+        check_drives_nothing(model, "at rest all rates are 0")
         self.model, layout = model, model.layout
         u = values_of_inputs(model, time)
         for name, value in (inputs or {}).items():

@@ -162,6 +162,7 @@ def static_equilibrium(
 
     Raises:
         InputError: a load or an input does not exist, or steps is no positive whole number.
+        ModelError: an element reads a sensor or drives an input, see driven_inputs.py.
         SimulationError: there is no equilibrium, or it is not unique; the free motion is named.
 
     Example:
