@@ -152,6 +152,13 @@ class TestInverse:
         done = command("inverse", PENDULUM, "--out", tmp_path / "x.csv", *options)
         assert done.status == USER_MISTAKE and said in done.err
 
+    def test_names_of_columns_may_hold_the_separator(self, command, tmp_path):
+        model, motion = tmp_path / "pendulum.yaml", tmp_path / "motion.csv"
+        model.write_text(PENDULUM.read_text().replace("name: swing", 'name: "swing, left"'))
+        motion.write_text('time_s,"a note, not read","swing, left_deg"\n' + "".join(f"0.{k},,{k}\n" for k in range(9)))
+        done = command("inverse", model, "--motion", motion, "--out", tmp_path / "x.csv")
+        assert done.status == 0 and "load of swing, left: " in done.out
+
     def test_muscles_are_asked_for_where_there_are_none(self, command, tmp_path):
         motion = tmp_path / "motion.csv"
         motion.write_text("time_s,swing_deg\n" + "".join(f"{0.1 * k},{k}\n" for k in range(20)))
