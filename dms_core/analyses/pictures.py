@@ -160,8 +160,7 @@ def _sway(linear: Linearisation, mode: Mode) -> float:
     """Largest way of a point over the mode's amplitude [m]; 0 where only element states change."""
     model, q = linear.model, linear.point.q
     h = 1e-4
-    bodies = sum(len(b.coordinates()) for b in model.system.bodies)
-    dq = np.where(np.arange(model.n_q) < bodies, mode.shape.real, 0.0)
+    dq = np.where(np.arange(model.n_q) < model.layout.of_bodies, mode.shape.real, 0.0)
     rest, moved = lines(model, q), lines(model, q + h * dq)
     way = max(float(np.abs(b - a).max()) for (_, a), (_, b) in zip(rest, moved, strict=True)) / h
     return way if way > 1e-6 * float(np.abs(mode.shape).max()) else 0.0
