@@ -30,6 +30,10 @@ from .kept_cells import run_cells
 
 USUAL = "exo/HiddenIntent-v0"
 FAULTS = "Faults of sensors reach the policies that read these sensors; to others it is the same episode again."
+ShiftNames = Annotated[
+    tuple[str, ...],
+    arg(metavar="NAME [NAME ...]", help=f"{', '.join(SHIFTS)}; all of them where none is given."),
+]
 Row = tuple[str, float, Policy, dict[str, dict[str, Any]]]
 """Shift, size, policy and its figures."""
 
@@ -37,7 +41,7 @@ Row = tuple[str, float, Policy, dict[str, dict[str, Any]]]
 def shift(
     policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
     out: FolderOut,
-    shifts: Annotated[tuple[str, ...], arg(metavar="NAME [NAME ...]")] = (),
+    shifts: ShiftNames = (),
     population: str = "mixed",
     patients: int = 20,
     seed: int = 1,
@@ -54,8 +58,7 @@ def shift(
     Args:
         policy_names: names of the command `policies`, folders of trained ones, or module:Class.
         out: folder for the results; made where it is missing.
-        shifts: hinge_offset, hinge_tilt, sensor_noise, sensor_delay, electrode_faults, patients, load; all of them
-            where none is given.
+        shifts: by name; all of them where none is given.
         population: of the patients without a shift, by name or YAML file.
         patients: how many, the same in every cell.
         seed: of the patients and of the bootstrap; another one than that of a training.
