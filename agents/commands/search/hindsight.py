@@ -6,24 +6,20 @@ import csv
 import io
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import Annotated
-
-from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import counted, printable
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs
 
-from ...environment import PROGRAM
+from ...environment import HIDDEN_PLAN, PROGRAM
 from ...evaluation.search.hindsight import hindsight as tried
 from ...evaluation.search.hindsight import summed_up, tuned_difference
 from ...evaluation.search.tries import KeptTries, Try, beside
 from ...evaluation.search.tuning import tunable
-from ..options import check_hides_plan
+from ..options import EnvironmentId, check_hides_plan
 from .kept_search import kept_search
 
-USUAL = "exo/HiddenIntent-v0"
 CLOCK, ANGLE = "mean_clock", "mean_angle"
 """Policies whose difference says what a clock is worth."""
 
@@ -36,7 +32,7 @@ def hindsight(
     seed: int = 0,
     workers: int = 1,
     address: str | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = USUAL,
+    environment: EnvironmentId = HIDDEN_PLAN,
     overwrite: bool = False,
 ) -> int:
     """Try many numbers of each classical policy on each patient, and write what the best of them reach.
@@ -54,7 +50,7 @@ def hindsight(
         environment: in which, by id; one whose task hides the patient's plan.
         overwrite: replace a file of this name.
     """
-    check_hides_plan(environment, USUAL)
+    check_hides_plan(environment, HIDDEN_PLAN)
     command = f"{PROGRAM} hindsight --population {shlex.quote(population)} --patients {patients} --tries {tries}"
     command += f" --seed {seed} --env {environment}"
     done: dict[str, list[Try]] = {}

@@ -8,9 +8,6 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, counted, printable
@@ -26,16 +23,15 @@ from ...evaluation.results.tables import cell
 from ...evaluation.sharing.kept_shares import forget
 from ...evaluation.studies.adaptation import Adaptation, best_of, hindsight_set, window_returns, windows_of
 from ...evaluation.studies.adaptation import adaptation as adapted
-from ...policies.learned import shipped_policies
 from ...policies.policy import Policy
-from ..options import check_hides_plan, different_policies
+from ..options import EnvironmentId, PolicyNames, check_hides_plan, different_policies, given_folders
 from .kept_cells import run_cells
 
 USUAL = "exo/NewPatient-v0"
 
 
 def adaptation(
-    policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
+    policy_names: PolicyNames,
     out: FolderOut,
     population: str = "evaluation",
     patients: int = 40,
@@ -43,7 +39,7 @@ def adaptation(
     seed: int = 1,
     workers: int = 1,
     address: str | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = USUAL,
+    environment: EnvironmentId = USUAL,
     overwrite: bool = False,
 ) -> int:
     """Run policies with new patients: return and regret of each window in adaptation.csv, .md and .png.
@@ -70,7 +66,7 @@ def adaptation(
     require_matplotlib()
     used = with_opponents(different_policies(policy_names, environment), environment)
     plan, behind = Plan(population, patients, seed, (), environment), hindsight_set(environment, tries, seed)
-    inputs: list[str | Path] = [population, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    inputs: list[str | Path] = [population, *given_folders(policy_names)]
     command = f"{PROGRAM} adaptation --policy {shlex.join(policy_names)} --population {shlex.quote(population)}"
     command += f" --patients {patients} --tries {tries} --seed {seed} --env {environment}"
     with Outputs("adaptation", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
