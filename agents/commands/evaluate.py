@@ -11,9 +11,9 @@ from tqdm import tqdm
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import DmsError, InputError, Stopped, counted
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_json, write_text
 from dms_core.files.outputs import Outputs, partial
-from exo_env.rendering.panels import require_matplotlib
 
 from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.comparison.evaluate import Plan, each_episode_of, results_of

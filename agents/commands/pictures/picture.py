@@ -9,8 +9,8 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import InputError
+from dms_core.figures import FORMATS, require_matplotlib
 from dms_core.files.outputs import OutputFile, Outputs
-from exo_env.rendering.panels import FORMATS, require_matplotlib
 
 from ...environment import HIDDEN_PLAN, environment_id
 from ...evaluation.episodes.time_course import TimeCourse, time_course

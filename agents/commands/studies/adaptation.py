@@ -11,9 +11,9 @@ from pathlib import Path
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, counted, printable
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import markdown_cell, write_text
 from dms_core.files.outputs import Outputs
-from exo_env.rendering.panels import require_matplotlib
 
 from ...environment import PROGRAM
 from ...evaluation.comparison.evaluate import Plan

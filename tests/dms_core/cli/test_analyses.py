@@ -5,13 +5,16 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dms_core.command_line import FAILED_RUN, USER_MISTAKE
-from dms_core.config_files import config_file
+from dms_core.config_files import config_file, configs
 from dms_core.model_file import dump
 from tests.dms_core.analyses.mechanisms import von_mises_truss
 
@@ -191,6 +194,16 @@ class TestModes:
     def test_a_picture_of_no_kind(self, command, tmp_path):
         done = command("modes", PENDULUM, "--out", tmp_path / "modes.csv", "--pictures", tmp_path / "modes.txt")
         assert done.status == USER_MISTAKE and "Expected a name that ends with .png, .svg, .pdf" in done.err
+
+    def test_an_unknown_backend_is_named_before_the_analysis(self, tmp_path):
+        pytest.importorskip("matplotlib")
+        options = ["--out", tmp_path / "modes.csv", "--pictures", tmp_path / "modes.png"]
+        done = subprocess.run(
+            [sys.executable, "-m", "dms_core", "modes", PENDULUM, *options], cwd=configs().parent,
+            env=os.environ | {"MPLBACKEND": "nonsense"}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == USER_MISTAKE and list(tmp_path.iterdir()) == []
+        assert done.stderr.startswith("error: matplotlib cannot be imported") and "'nonsense'" in done.stderr
 
 
 @pytest.mark.parametrize("name", ["static", "kinematic", "inverse", "modes"])
