@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,18 +15,12 @@ from dms_core.command_line import FAILED_RUN, USER_MISTAKE
 from dms_core.config_files import config_file, configs
 from dms_core.model_file import dump
 from tests.dms_core.analyses.mechanisms import von_mises_truss
+from tests.dms_core.cli.tables import read
 
 PENDULUM = config_file("models/pendulum.yaml")
 FOUR_BAR = config_file("models/four_bar.yaml")
 SPRING = config_file("models/spring_mass.yaml")
 ATWOOD = config_file("models/atwood.yaml")
-
-
-def read(path: Path) -> dict[str, np.ndarray]:
-    """A CSV table by column."""
-    with path.open(newline="") as file:
-        names, *rows = csv.reader(file)
-    return dict(zip(names, np.array(rows, float).T, strict=True))
 
 
 class TestStatic:
