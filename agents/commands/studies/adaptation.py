@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -19,7 +17,7 @@ from ...environment import PROGRAM
 from ...evaluation.comparison.evaluate import Plan
 from ...evaluation.comparison.opponents import with_opponents
 from ...evaluation.figures.line_figures import Curve, draw_panels, line_titles
-from ...evaluation.results.tables import cell
+from ...evaluation.results.tables import cell, records_text
 from ...evaluation.sharing.kept_shares import forget
 from ...evaluation.studies.adaptation import Adaptation, best_of, hindsight_set, window_returns, windows_of
 from ...evaluation.studies.adaptation import adaptation as adapted
@@ -95,16 +93,13 @@ def _lines(found: Mapping[str, Adaptation]) -> list[str]:
 
 def _numbers(found: Mapping[str, Adaptation], patients: int, command: str) -> str:
     """A row a policy and window, below a line with the command."""
-    text = io.StringIO()
-    text.write(f"# {printable(command)}\n")
-    rows = csv.writer(text, lineterminator="\n")
     ends = [f"{name}{end}" for name in ("return", "regret") for end in ("", "_low", "_high")]
-    rows.writerow(["policy", "patients", "window", *ends])
+    records = []
     for name, one in found.items():
         for k, (returned, regret) in enumerate(zip(one.returns, one.regrets, strict=True), 1):
             numbers = [f"{x:.5g}" for e in (returned, regret) for x in (e.value, e.low, e.high)]
-            rows.writerow([name, patients, k, *numbers])
-    return text.getvalue()
+            records.append({"policy": name, "patients": patients, "window": k, **dict(zip(ends, numbers, strict=True))})
+    return records_text(records, command)
 
 
 def _text(found: Mapping[str, Adaptation], plan: Plan, tried: int, windows: int, command: str) -> str:
