@@ -30,6 +30,8 @@ __all__ = (
 
 ENVIRONMENT = "exo/ElbowLift-v2"
 """The environment where none is named."""
+HIDDEN_PLAN = "exo/HiddenIntent-v0"
+"""That of the studies where none is named: its task hides the patient's plan."""
 PROGRAM = f"python -m {__name__.partition('.')[0]}"
 """This command line, under the name by which it is installed."""
 

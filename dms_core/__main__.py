@@ -22,6 +22,7 @@ import numpy as np
 from tyro.conf import Positional, arg
 
 from dms_core import Model, SolverOptions, Trajectory
+from dms_core.analyses.commands.ending import output_files
 from dms_core.analyses.commands.inverse import inverse
 from dms_core.analyses.commands.kinematic import kinematic
 from dms_core.analyses.commands.modes import modes
@@ -30,7 +31,7 @@ from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_co
 from dms_core.errors import InputError, Stopped
 from dms_core.files.output_file import check_columns, check_size, write_csv, write_json, write_text
 from dms_core.files.output_place import descriptor
-from dms_core.files.outputs import OutputFile, Outputs, partial
+from dms_core.files.outputs import Outputs, partial
 from dms_core.model_tables import columns, compiled, heads
 from dms_core.results import Result
 from dms_core.schema import reference
@@ -109,8 +110,7 @@ def run(
         overwrite: replace files of these names.
     """
     options = _options(t_end, sample, rtol, atol, step, method)
-    files = [OutputFile("--out", out), *([] if stats is None else [OutputFile("--stats", stats)])]
-    with Outputs("run", files=files, inputs=[model], overwrite=overwrite) as outputs:
+    with Outputs("run", files=output_files(out=out, stats=stats), inputs=[model], overwrite=overwrite) as outputs:
         trajectory = _simulated(compiled(model), options, t_end, sample, stop_at)
         if trajectory.result is Result.INTERRUPTED:
             write_csv(part := partial(out), lambda: table(trajectory, sample))
@@ -199,7 +199,7 @@ def schema(
     if out is None:
         print(reference(), end="")
         return 0
-    with Outputs("schema", files=[OutputFile("--out", out)], overwrite=overwrite) as outputs:
+    with Outputs("schema", files=output_files(out=out), overwrite=overwrite) as outputs:
         write_text(out, reference())
     return FAILED_RUN if outputs.failed else 0
 

@@ -192,9 +192,7 @@ class Trajectory:
             raise InputError(f"sample: Expected a positive time, got {sample} s.")
         end = self.t[-1]
         check_memory(f"sample: {sample:g} s", end / sample + 1.0, self._numbers_a_state)
-        # A multiple of `sample` that rounding puts just behind the end still counts.
-        times = np.minimum(np.arange(int(np.floor(end / sample * (1.0 + 1e-12))) + 1) * sample, end)
-        return times if end - times[-1] < 1e-9 * sample else np.append(times, end)
+        return regular_times(0.0, end, sample)
 
     @property
     def _numbers_a_state(self) -> int:
@@ -237,6 +235,14 @@ class States:
         """Every component of every sensor by name, shape (k,) each."""
         y = self.model.measure(self.signals, self.t, self.q, self.v, self.a, self.lam, self.behind)
         return {name: y[:, k] for k, (name, _) in enumerate(self.model.layout.outputs)}
+
+
+def regular_times(start: float, end: float, sample: float) -> np.ndarray:
+    """start, start + sample, start + 2 sample, ... and the end [s]."""
+    # A multiple of `sample` that rounding puts just behind the end still counts.
+    times = start + np.arange(int(np.floor((end - start) / sample * (1.0 + 1e-12))) + 1) * sample
+    times = np.minimum(times, end)
+    return times if end - times[-1] < 1e-9 * sample else np.append(times, end)
 
 
 def _behind_jumps(t: np.ndarray) -> np.ndarray:

@@ -32,8 +32,7 @@ ALLOWED = {
     "agents/training/files/run_folder.py": {"open"},
     # Into a file in memory, from an archive, and into a folder of its own for another program.
     "agents/training/files/model_state.py": {"np.savez", "zipfile.ZipFile"},
-    "dms_core/analyses/pictures.py": {"savefig"},
-    "exo_env/rendering/panels.py": {"savefig"},
+    "dms_core/figures.py": {"savefig"},
     "agents/commands/pictures/video.py": {"imageio.get_writer", "tempfile.TemporaryDirectory"},
 }
 """What each file may do itself, and why."""

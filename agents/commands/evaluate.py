@@ -5,16 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from tqdm import tqdm
-from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import DmsError, InputError, Stopped, counted
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_json, write_text
 from dms_core.files.outputs import Outputs, partial
-from exo_env.rendering.panels import require_matplotlib
 
 from ..environment import ENVIRONMENT, environment_id
 from ..evaluation.comparison.evaluate import Plan, each_episode_of, results_of
@@ -24,20 +23,20 @@ from ..evaluation.results.tables import gap_lines, heading, left_out_lines, shor
 from ..policies.baselines import FOLLOWING, POLICIES
 from ..policies.learned import find_policy, shipped_policies
 from ..policies.policy import Policy
-from .options import device_settings, different_policies, repeated
+from .options import EnvironmentId, PolicyNames, device_settings, different_policies, given_folders, repeated
 
 EVALUATION = "evaluation.json"
 
 
 def evaluate(
-    policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
+    policy_names: PolicyNames,
     out: FolderOut,
     population: str = "evaluation",
     patients: int = 20,
     seed: int = 0,
     loads: tuple[float, ...] = (),
     repetitions: int | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
+    environment: EnvironmentId = ENVIRONMENT,
     exoskeleton: str | None = None,
     workers: Literal["here", "ray"] = "here",
     address: str | None = None,
@@ -68,7 +67,7 @@ def evaluate(
     used = with_opponents(different_policies(policy_names, environment), environment)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     plan = Plan(population, patients, seed, loads, environment, settings)
-    inputs = [population, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    inputs = [population, exoskeleton, *given_folders(policy_names)]
     with Outputs("evaluate", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
         results = _results(used, plan, outputs, out, workers, address)
         write_json(out / EVALUATION, results)

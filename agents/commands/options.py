@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from tyro.conf import arg
 
 from dms_core.errors import InputError
 from dms_core.files.json_text import brief, parse_json
@@ -24,6 +26,11 @@ from ..policies.learned import (
     shipped_policies,
 )
 from ..policies.policy import Policy
+
+PolicyNames = Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")]
+"""Option of the policies that a command runs."""
+EnvironmentId = Annotated[str, arg(name="env", metavar="ID")]
+"""Option of the environment that they act in."""
 
 
 def different_policies(names: Sequence[str], environment: str | None = None) -> list[Policy]:
@@ -44,6 +51,11 @@ def different_policies(names: Sequence[str], environment: str | None = None) -> 
         if len(found) < len(policies):
             raise InputError(f"policies '{first}' and '{name}' are the same one: expected different policies.")
     return policies
+
+
+def given_folders(names: Sequence[str]) -> list[Path]:
+    """What a command reads of policies by the names of a user: folders of trained ones that are not shipped."""
+    return [Path(name) for name in names if name not in shipped_policies()]
 
 
 def _identity(name: str, one: Policy, environment: str | None) -> Any:

@@ -3,8 +3,9 @@
     phi_q^T lam = f - M vdot,     load of a driver = -lam
 
 along the positions, velocities and accelerations that the drivers prescribe (kinematic.py). What muscles, motors and
-controllers do is unknown: elements with states of their own, and what pulls by such a state, are left out, and so are
-those that are named. The load of the driver of a joint is then the net moment that all of them together must give.
+controllers do is unknown: elements with states of their own, and what pulls by such a state or by an input that such an
+element drives, are left out, and so are those that are named. The load of the driver of a joint is then the net moment
+that all of them together must give.
 
 A recorded motion is filtered before it is differentiated twice: `cutoff` of its signal (kind: table or samples) is a
 Butterworth low-pass of order 2, run forwards and backwards (`model/smoothing.py`), and interpolation 'quintic' gives
@@ -101,12 +102,14 @@ def inverse_dynamics(
 
 
 def _with_states(system: System) -> list[str]:
-    """Forces that own coordinates, and those that read such a coordinate."""
+    """Forces that own coordinates, and those that read such a coordinate or an input that one of these drives."""
     own = {f.name for f in system.forces if f.coordinates()}
+    driven = {u for f in system.forces for u, _ in f.driven_inputs()}
     found = []
     for force in system.forces:
-        read = {c.rpartition(".")[0] for place in force.placements(system) for c in place.coordinates}
-        if force.name in own or read & own:
+        places = force.placements(system)
+        read = {c.rpartition(".")[0] for place in places for c in place.coordinates}
+        if force.name in own or read & own or any(driven.intersection(place.inputs) for place in places):
             found.append(force.name)
     return found
 

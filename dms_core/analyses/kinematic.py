@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dms_core.analyses.driven_inputs import check_drives_nothing
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.assembly.blocks import OperatingPoint
 from dms_core.assembly.model import Model
@@ -101,13 +102,13 @@ class Driven:
         model: a compiled model.
 
     Raises:
-        ModelError: a freedom has no driver, or two drivers determine the same one.
+        ModelError: a freedom has no driver, two drivers determine the same one, or an element drives an input.
     """
 
     def __init__(self, model: Model) -> None:
+        check_drives_nothing(model, "states of elements do not follow from positions")
         self.model = model
-        bodies = sum(len(body.coordinates()) for body in model.system.bodies)
-        self.moving = np.arange(bodies)
+        self.moving = np.arange(model.layout.of_bodies)
         self.scale = model.tables.values.scale_q
         self._signals, self._work = Packed(model.new_signals()), Packed(model.new_work())
         _check_drivers(model, self.moving)
@@ -135,8 +136,8 @@ class Driven:
         """v and vdot at a position."""
         model, zero = self.model, np.zeros(self.model.n_q)
         v, a = zero.copy(), zero.copy()
-        phi_t = model.constraint_jacobian(q, zero, t, t > 0.0)[1]
-        G = model.constraint_jacobian(q, zero, t, t > 0.0)[2][:, self.moving]
+        _, phi_t, G, _ = model.constraint_jacobian(q, zero, t, t > 0.0)
+        G = G[:, self.moving]
         v[self.moving] = np.linalg.lstsq(G, -phi_t, rcond=1e-12)[0]
         u = self.inputs(t)
         point = OperatingPoint(q, v, v, zero, np.zeros(model.n_phi), np.zeros(model.n_phi), u)
@@ -176,7 +177,8 @@ def kinematic(
 
     Raises:
         InputError: times do not rise, begin before 0, or are more than memory holds the motion of.
-        ModelError: a driver is missing, or two drive the same coordinate; names the motion or the drivers.
+        ModelError: a driver is missing, or two drive the same coordinate; names the motion or the drivers. An element
+            drives an input, which would be 0; names both.
 
     Example:
         >>> result = kinematic(model, np.linspace(0.0, 2.0, 201)).check()
@@ -352,11 +354,14 @@ def _check_drivers(model: Model, moving: np.ndarray) -> None:
 
 def driver_loads(model: Model, states: States) -> dict[str, np.ndarray]:
     """What each driver gives: moment [Nm] or force [N] in the sense of its growing input, shape (n,) each."""
-    found = {}
-    for call in model.layout.constraints:
-        if not len(call.iu):
-            continue
-        for k in range(call.rows):
-            name = call.element.name if call.rows == 1 else model.layout.row_names[call.row + k]
-            found[name] = -states.lam[:, call.row + k]
-    return found
+    return {name: -states.lam[:, row] for name, row in driver_rows(model).items()}
+
+
+def driver_rows(model: Model) -> dict[str, int]:
+    """Constraint row of each driver, by its name; by the row's where a driver has several."""
+    names = model.layout.row_names
+    return {
+        c.element.name if c.rows == 1 else names[row]: row
+        for c in model.layout.constraints if len(c.iu)
+        for row in range(c.row, c.row + c.rows)
+    }  # fmt: skip

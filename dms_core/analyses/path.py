@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from dms_core.analyses.independent import basis
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.analyses.rest_equations import RestBlocks, RestEquations
-from dms_core.analyses.static import Equilibrium, balancing, equilibrium_at, relaxed, states_at_rest
+from dms_core.analyses.static import Equilibrium, balanced, equilibrium_at, relaxed, states_at_rest, stiffnesses
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError
 from dms_core.model.system import System
@@ -113,12 +113,9 @@ class _Follower:
 
     def place(self, q: np.ndarray, s: float, before: _Place | None) -> _Place:
         """A converged position with its tangent, in the direction of the place before."""
-        zero = np.zeros(self.equations.model.n_phi)
-        lam = balancing(self.equations.at(q, zero, s))
-        b = self.equations.at(q, lam, s)
+        lam, b = balanced(self.equations, q, np.zeros(self.equations.model.n_phi), s)
         N, p = basis(self.equations.model, b.G), _shift(b)
-        rows = np.concatenate([N.T @ b.K @ N, (N.T @ (b.f_s + b.K @ p))[:, None]], axis=1)
-        rows = rows / (np.abs(b.K).max(initial=0.0) or 1.0)
+        rows = _bordered(b, N, p) / (np.abs(b.K).max(initial=0.0) or 1.0)
         if before is None:
             tangent = np.linalg.svd(rows)[2][-1]
         else:
@@ -151,14 +148,12 @@ class _Follower:
             s = load
         lam = at.lam
         for _ in range(ITERATIONS):
-            b = self.equations.at(q, lam, s)
-            lam = balancing(b)
-            b = self.equations.at(q, lam, s)
+            lam, b = balanced(self.equations, q, lam, s)
             if not (np.isfinite(b.f).all() and np.isfinite(b.K).all()):
                 return None
             N, p = basis(model, b.G), _shift(b)
             close = -np.linalg.lstsq(b.G, b.phi, rcond=1e-12)[0] if len(b.phi) else np.zeros(model.n_q)
-            rows = np.concatenate([N.T @ b.K @ N, (N.T @ (b.f_s + b.K @ p))[:, None]], axis=1)
+            rows = _bordered(b, N, p)
             gone = np.sum(at.tq * (q + close - at.q) / self.scale**2) + at.ts * (s - at.s)
             border = self._border(at.tq, at.ts, N, p) if load is None else np.eye(len(rows) + 1)[-1]
             right = np.append(-(N.T @ (b.f + b.K @ close)), length - gone if load is None else load - s)
@@ -173,6 +168,11 @@ class _Follower:
             if size < CONVERGED:
                 return self.place(q, s, at)
         return None
+
+
+def _bordered(b: RestBlocks, N: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """[N^T K N, N^T (f_s + K p)], the rows of equilibrium by (dz, ds), shape (k, k + 1)."""
+    return np.concatenate([N.T @ b.K @ N, (N.T @ (b.f_s + b.K @ p))[:, None]], axis=1)
 
 
 def _row_sizes(b: RestBlocks, N: np.ndarray) -> np.ndarray:
@@ -218,6 +218,7 @@ def follow_path(
 
     Raises:
         InputError: no load is named, one does not exist, or a number is out of range.
+        ModelError: an element reads a sensor or drives an input.
         SimulationError: there is no equilibrium to begin with.
 
     Example:
@@ -273,7 +274,7 @@ def _events(follower: _Follower, here: _Place, there: _Place, length: float) -> 
         place = there if number(there) == 0.0 else _located(follower, here, length, number)
         if place is not None:
             equations = follower.equations
-            motion = place.N @ np.linalg.svd(place.N.T @ place.b.K @ place.N)[2][-1]
+            motion = stiffnesses(place.b, place.N)[1][:, -1]
             equilibrium = equilibrium_at(equations, place.q, place.lam, place.s, 0)
             found.append(Event(kind, equilibrium, motion_in_words(equations.model, place.q, motion)))
     return found

@@ -7,7 +7,6 @@ as large as it can be seen, brought back onto the constraints, so that joints st
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,11 @@ import numpy as np
 from dms_core.analyses.linearise import Linearisation, Mode
 from dms_core.analyses.motion_names import rotate
 from dms_core.assembly.model import Model
-from dms_core.errors import DmsError, InputError, extra
-from dms_core.files.output_file import write_bytes
+from dms_core.errors import InputError
+from dms_core.figures import FORMATS, drawn, write_figure
 from dms_core.model.element import GROUND
 from dms_core.model.geometry.path import PathPoint
 
-FORMATS = (".png", ".svg", ".pdf")
 RESOLUTION = 130
 """[dots per inch]"""
 LARGEST, CLOSINGS = 0.08, 8
@@ -33,18 +31,6 @@ REST, FORTH, BACK, CORD = "#9AA0A6", "#0072B2", "#D55E00", "#C9A227"
 
 Lines = list[tuple[str, np.ndarray]]
 """(body, or '' for a cord) and the points of each, shape (k, 3)."""
-
-
-def require_matplotlib() -> None:
-    """Refuse an analysis whose pictures could not be drawn, before it begins.
-
-    Raises:
-        DmsError: matplotlib is missing.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise DmsError(f"pictures need matplotlib. {extra('pictures')}") from None
 
 
 def attachments(model: Model) -> dict[str, list[np.ndarray]]:
@@ -119,6 +105,7 @@ def figure_size(figure: Lines) -> float:
     return float(np.ptp(points, axis=0).max()) or 1.0
 
 
+@drawn
 def draw_modes(path: Path, linear: Linearisation, modes: Sequence[Mode] | None = None) -> Path:
     """Write a picture of mode shapes: at rest in grey, and at both ends of the swing.
 
@@ -132,36 +119,29 @@ def draw_modes(path: Path, linear: Linearisation, modes: Sequence[Mode] | None =
     """
     if path.suffix not in FORMATS:
         raise InputError(f"picture '{path}': Expected a name that ends with {', '.join(FORMATS)}.")
-    drawn = [m for m in (modes if modes is not None else linear.modes()) if _sway(linear, m) > 0.0][:MOST]
-    if not drawn:
+    shown = [m for m in (modes if modes is not None else linear.modes()) if _sway(linear, m) > 0.0][:MOST]
+    if not shown:
         raise InputError("no mode of this model moves a body; there is nothing to draw.")
-    import matplotlib.style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.style.context("default"):
-        across = min(4, len(drawn))
-        down = -(-len(drawn) // across)
-        sheet = Figure(figsize=(3.1 * across, 3.3 * down), dpi=RESOLUTION, layout="constrained")
-        FigureCanvasAgg(sheet)
-        panels = sheet.subplots(down, across, squeeze=False)
-        for ax, mode in zip(panels.flat, drawn, strict=False):
-            _draw(ax, linear, mode)
-        for ax in list(panels.flat)[len(drawn) :]:
-            ax.set_visible(False)
-        picture = io.BytesIO()
-        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-        sheet.savefig(picture, format=path.suffix.removeprefix("."), metadata=metadata)
-    write_bytes(path, picture.getvalue())
-    return path
+    across = min(4, len(shown))
+    down = -(-len(shown) // across)
+    sheet = Figure(figsize=(3.1 * across, 3.3 * down), dpi=RESOLUTION, layout="constrained")
+    FigureCanvasAgg(sheet)
+    panels = sheet.subplots(down, across, squeeze=False)
+    for ax, mode in zip(panels.flat, shown, strict=False):
+        _draw(ax, linear, mode)
+    for ax in list(panels.flat)[len(shown) :]:
+        ax.set_visible(False)
+    return write_figure(sheet, path)
 
 
 def _sway(linear: Linearisation, mode: Mode) -> float:
     """Largest way of a point over the mode's amplitude [m]; 0 where only element states change."""
     model, q = linear.model, linear.point.q
     h = 1e-4
-    bodies = sum(len(b.coordinates()) for b in model.system.bodies)
-    dq = np.where(np.arange(model.n_q) < bodies, mode.shape.real, 0.0)
+    dq = np.where(np.arange(model.n_q) < model.layout.of_bodies, mode.shape.real, 0.0)
     rest, moved = lines(model, q), lines(model, q + h * dq)
     way = max(float(np.abs(b - a).max()) for (_, a), (_, b) in zip(rest, moved, strict=True)) / h
     return way if way > 1e-6 * float(np.abs(mode.shape).max()) else 0.0

@@ -20,13 +20,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.analyses.driven_inputs import check_drives_nothing, check_reads_nothing
 from dms_core.assembly.blocks import Blocks, OperatingPoint
 from dms_core.assembly.input_derivatives import STEP
 from dms_core.assembly.layout import Call
 from dms_core.assembly.model import Model
-from dms_core.assembly.residual import evaluate_inputs
-from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, ModelError, ModelWarning, choices
+from dms_core.flags import input_values
 from dms_core.model.element import Force
 from dms_core.model.system import System
 
@@ -100,6 +100,7 @@ class RestEquations:
 
     Raises:
         InputError: a load is neither an input nor a force without coordinates, or a value is not finite.
+        ModelError: an element reads a sensor or drives an input.
     """
 
     def __init__(
@@ -109,8 +110,10 @@ class RestEquations:
         time: float = 0.0,
         inputs: dict[str, float] | None = None,
     ) -> None:
+        check_reads_nothing(model)
+        check_drives_nothing(model, "at rest all rates are 0")
         self.model, layout = model, model.layout
-        u = values_of_inputs(model, time)
+        u = input_values(model, model.new_signals(), np.array([time]), np.zeros((1, model.n_q)), np.array([True]))[0]
         for name, value in (inputs or {}).items():
             if not np.isfinite(value):
                 raise InputError(f"input '{name}': Expected a finite number, got {value}.")
@@ -224,11 +227,3 @@ class RestEquations:
             else:
                 b.f[i], b.C[i, i] = -self._rate(call, k, q, s), 1.0
                 b.K[i], b.f_s[i] = -by_q, -by_s
-
-
-def values_of_inputs(model: Model, time: float) -> np.ndarray:
-    """Values of all inputs at a time [s], shape (n_u,)."""
-    work = model.new_work()
-    packed = Packed(work)
-    evaluate_inputs(Packed(model.new_signals()).table, time, False, packed.table)
-    return work.u[:, 0].copy()

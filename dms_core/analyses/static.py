@@ -162,6 +162,7 @@ def static_equilibrium(
 
     Raises:
         InputError: a load or an input does not exist, or steps is no positive whole number.
+        ModelError: an element reads a sensor or drives an input, see driven_inputs.py.
         SimulationError: there is no equilibrium, or it is not unique; the free motion is named.
 
     Example:
@@ -202,14 +203,14 @@ def relaxed(equations: RestEquations, q: np.ndarray, s: float) -> tuple[np.ndarr
     scale = model.tables.values.scale_q
     h, change = FIRST_TIME, np.zeros(model.n_q)
     q = closed(equations, q, s)
-    lam, b = _balanced(equations, q, np.zeros(model.n_phi), s)
+    lam, b = balanced(equations, q, np.zeros(model.n_phi), s)
     at_start = float(np.abs(b.f).max(initial=0.0))
     for iteration in range(1, MAX_ITERATIONS + 1):
         N = basis(model, b.G)
         change = _step(model, b, N, h)
         trial = closed(equations, q + change, s) if _short(model, change, scale) else None
         if trial is not None:
-            lam_trial, b_trial = _balanced(equations, trial, lam, s)
+            lam_trial, b_trial = balanced(equations, trial, lam, s)
         if trial is None or not _creeps(model, b, b_trial, N, change, h):
             h *= 0.25
             if h < SMALLEST_TIME:
@@ -235,7 +236,7 @@ def _balanced_forces(model: Model, b: RestBlocks, lam: np.ndarray, at_start: flo
     return bool(np.all(left <= LEFT * max(float(parts.max(initial=0.0)), at_start) + rounding))
 
 
-def _balanced(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float) -> tuple[np.ndarray, RestBlocks]:
+def balanced(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: float) -> tuple[np.ndarray, RestBlocks]:
     """Multipliers of least norm that balance what they can, and the equations with them."""
     b = equations.at(q, lam, s)
     lam = balancing(b)
@@ -272,15 +273,10 @@ def _step(model: Model, b: RestBlocks, N: np.ndarray, h: float) -> np.ndarray:
     return N @ np.linalg.lstsq(reduced, -(N.T @ b.f), rcond=1e-13)[0]
 
 
-def _bodies(model: Model) -> int:
-    """Number of coordinates of bodies, which come first."""
-    return sum(len(body.coordinates()) for body in model.system.bodies)
-
-
 def _short(model: Model, change: np.ndarray, scale: np.ndarray) -> bool:
     """Whether a step is finite, and moves bodies, and states with a smallest value, not too far."""
     bounded = np.array([np.isfinite(c.least) for c in model.layout.coordinates])
-    bounded[: _bodies(model)] = True
+    bounded[: model.layout.of_bodies] = True
     return bool(np.isfinite(change).all() and np.max(np.abs(change[bounded]) / scale[bounded], initial=0.0) <= LONGEST)
 
 
@@ -291,7 +287,7 @@ def _creeps(model: Model, b: RestBlocks, after: RestBlocks, N: np.ndarray, chang
     if np.max(np.abs(change) / model.tables.values.scale_q, initial=0.0) < NEAR:
         # What is left of the force may be rounding, which has no direction.
         return True
-    k = _bodies(model)
+    k = model.layout.of_bodies
     along = N @ (N.T @ change)
     along[k:] = 0.0
     meanwhile = b.f + (b.K + b.C / h)[:, k:] @ change[k:]
@@ -299,9 +295,8 @@ def _creeps(model: Model, b: RestBlocks, after: RestBlocks, N: np.ndarray, chang
     return bool(before >= 0.0 and behind >= -TURNED * before)
 
 
-def stiffnesses(model: Model, b: RestBlocks) -> tuple[np.ndarray, np.ndarray]:
-    """Singular values of K along the motions that are free, over nominal sizes, and these motions, (k,), (n_q, k)."""
-    N = basis(model, b.G)
+def stiffnesses(b: RestBlocks, N: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Singular values of K along the motions N that are free, falling, and these motions, (k,), (n_q, k)."""
     _, values, motions = np.linalg.svd(N.T @ b.K @ N)
     return values, N @ motions.T
 
@@ -316,11 +311,11 @@ def _check_unique(equations: RestEquations, q: np.ndarray, b: RestBlocks) -> Non
     N = basis(model, b.G)
     if not N.shape[1]:
         return
-    _, values, motions = np.linalg.svd(N.T @ b.K @ N)
+    values, motions = stiffnesses(b, N)
     # Of forces that cancel, rounding is left: it is compared with them, not with itself.
     parts = float(np.max(np.abs(N.T) @ np.abs(b.K) @ np.abs(N)))
     soft = values <= SOFT * max(float(values[0]), parts)
-    free = N @ motions[soft].T
+    free = motions[:, soft]
     if not free.shape[1]:
         return
     words = "; ".join(motion_in_words(model, q, free[:, k]) for k in range(min(free.shape[1], 3)))
@@ -337,7 +332,7 @@ def _count(number: int) -> str:
 def _nowhere(equations: RestEquations, q: np.ndarray, b: RestBlocks, change: np.ndarray, s: float) -> str:
     """Why there is no equilibrium: what moves on."""
     model = equations.model
-    values, motions = stiffnesses(model, b)
+    values, motions = stiffnesses(b, basis(model, b.G))
     if not len(values):
         return "there is no equilibrium: nothing can move, and the equations of element states have no solution."
     push = np.abs(motions.T @ b.f)

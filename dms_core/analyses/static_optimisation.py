@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dms_core.analyses.inverse import InverseResult
+from dms_core.analyses.kinematic import driver_rows
 from dms_core.analyses.least_activations import least_activations
 from dms_core.assembly.layout import GROUND_COORDINATES
-from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError, choices
 from dms_core.model.geometry.path import add_path_gradient, path_table
 from dms_core.model.muscles.activation import MINIMUM
@@ -129,12 +129,12 @@ def static_optimisation(
 def _geometry(inverse: InverseResult, muscles: Sequence[ThelenMuscle]) -> tuple[np.ndarray, np.ndarray]:
     """Muscle-tendon lengths, shape (n, m), and moment arms about all drivers, shape (n, drivers, m)."""
     model, states = inverse.model, inverse.motion.states
-    rows = _driver_rows(model)
+    rows = list(driver_rows(model).values())
     lengths = np.zeros((len(states.t), len(muscles)))
     arms = np.zeros((len(states.t), len(rows), len(muscles)))
     tables = [path_table(model.system, m.path) for m in muscles]
     places = [np.concatenate([model.layout.body_indices(b) for b in table.bodies]) for table in tables]
-    bodies = np.arange(sum(len(body.coordinates()) for body in model.system.bodies))
+    bodies = slice(model.layout.of_bodies)
     for k in range(len(states.t)):
         q = np.concatenate([states.q[k], GROUND_COORDINATES])
         gradients = np.zeros((model.n_q + 7, len(muscles)))
@@ -147,11 +147,6 @@ def _geometry(inverse: InverseResult, muscles: Sequence[ThelenMuscle]) -> tuple[
         balancing = np.linalg.lstsq(G.T, -gradients[bodies], rcond=1e-12)[0]
         arms[k] = balancing[rows]
     return lengths, arms
-
-
-def _driver_rows(model: Model) -> list[int]:
-    """Rows of the drivers, in the order of `driver_loads`."""
-    return [c.row + k for c in model.layout.constraints if len(c.iu) for k in range(c.rows)]
 
 
 def _settled(

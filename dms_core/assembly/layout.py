@@ -95,6 +95,11 @@ class Layout:
         everything = (self.names, self.row_names, self.outputs, sorted(self.input_index.items()), counts, parts)
         return hashlib.sha256(repr(everything).encode()).hexdigest()
 
+    @cached_property
+    def of_bodies(self) -> int:
+        """Number of the coordinates of bodies, which come first."""
+        return sum(len(body.coordinates()) for body in self.system.bodies)
+
     def body_indices(self, name: str) -> np.ndarray:
         """Global indices of a body's seven local coordinates."""
         ground = self.n_q + np.arange(7)

@@ -122,7 +122,7 @@ class Model:
     @property
     def degrees_of_freedom(self) -> int:
         """Mechanical freedoms: coordinates of bodies less independent rows."""
-        return sum(len(body.coordinates()) for body in self.system.bodies) - len(self.start.active)
+        return self.layout.of_bodies - len(self.start.active)
 
     def new_work(self) -> Work:
         """Fresh work arrays of this model."""

@@ -7,7 +7,7 @@ import io
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,9 +41,7 @@ class CsvTable(NamedTuple):
             InputError: there is none; lists the names.
         """
         if name not in self.columns:
-            raise InputError(
-                f"table '{self.path}': column '{name}' does not exist. There are: {choices(self.columns)}."
-            )
+            raise _no_column(self.path, name, self.columns)
         return self.columns[name]
 
 
@@ -57,16 +55,7 @@ def read_table(path: str | Path, wanted: tuple[str, ...] = ()) -> CsvTable:
     Raises:
         InputError: a column is missing or stands twice, a cell is empty or no finite number; names file, line, column.
     """
-    text = decoded(path, read_bytes(path, MOST_BYTES))
-    first = text.partition("\n")[0]
-    separator = max(",;\t", key=first.count)
-    rows = csv.reader(io.StringIO(text), delimiter=separator)
-    names = [name.strip() for name in next(rows, [])]
-    if not any(names):
-        raise InputError(f"table '{path}' is empty. Expected a line of column names, then lines of numbers.")
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"table '{path}': column '{name}' stands {names.count(name)} times; expected it once.")
+    names, rows = _begun(path)
     for name in wanted:
         if name not in names:
             raise _no_column(path, name, names)
@@ -82,6 +71,30 @@ def read_table(path: str | Path, wanted: tuple[str, ...] = ()) -> CsvTable:
         raise InputError(f"table '{path}' has column names but no rows.")
     table = np.array(values)
     return CsvTable(Path(path), {name: table[:, k].copy() for k, (name, _) in enumerate(places)}, lines)
+
+
+def column_names(path: str | Path) -> list[str]:
+    """Names of all columns of a table.
+
+    Raises:
+        InputError: the table is empty, or a column stands twice.
+    """
+    return _begun(path)[0]
+
+
+def _begun(path: str | Path) -> tuple[list[str], Any]:
+    """Names of the columns, and a reader of the lines behind them."""
+    text = decoded(path, read_bytes(path, MOST_BYTES))
+    first = text.partition("\n")[0]
+    separator = max(",;\t", key=first.count)
+    rows = csv.reader(io.StringIO(text), delimiter=separator)
+    names = [name.strip() for name in next(rows, [])]
+    if not any(names):
+        raise InputError(f"table '{path}' is empty. Expected a line of column names, then lines of numbers.")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"table '{path}': column '{name}' stands {names.count(name)} times; expected it once.")
+    return names, rows
 
 
 def _no_column(path: str | Path, name: str, names: Iterable[str]) -> InputError:

@@ -210,7 +210,7 @@ class SlackSimulation:
             phase.state.clock[CLOCK.t] = self.time
             point = phase.operating_point(behind=True)
             blocks = phase.blocks(point)
-            bodies = sum(len(b.coordinates()) for b in phase.model.system.bodies)
+            bodies = phase.model.layout.of_bodies
             rows = phase.model.active_rows
             M, G = blocks.r2_a.toarray()[:bodies, :bodies], blocks.phi_q.toarray()[rows][:, :bodies]
             left = np.concatenate([np.zeros(bodies), -blocks.r4[rows]])

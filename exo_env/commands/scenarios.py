@@ -12,6 +12,7 @@ from tyro.conf import arg
 from dms_core import SolverOptions
 from dms_core.command_line import FAILED_RUN, FolderOut, moves
 from dms_core.errors import InputError, Stopped
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_csv, write_json
 from dms_core.files.outputs import Outputs
 from dms_core.model.control.ziegler_nichols import Gains
@@ -25,7 +26,6 @@ from exo_env.paper.scenarios import FILES, Exercise, Scenario, ScenarioRun, load
 from exo_env.paper.statements import ORDERINGS, judged
 from exo_env.paper.summary import columns, summary
 from exo_env.paper.tuning import StepExperiment
-from exo_env.rendering.panels import require_matplotlib
 
 BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.3g} of {total:.3g} s simulated, {elapsed} passed, {remaining} left"
 

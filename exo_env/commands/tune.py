@@ -8,13 +8,13 @@ from typing import Annotated
 from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_json
 from dms_core.files.outputs import Outputs
 from dms_core.model.control.ziegler_nichols import STEP, Gains, ziegler_nichols
 from exo_env.ecosystem.exoskeleton import DEFAULT, Exoskeleton
 from exo_env.paper.tuning import START, StepExperiment, Tuning, proportional
 from exo_env.paper.tuning import tune as find_gains
-from exo_env.rendering.panels import require_matplotlib
 
 
 def tune(

@@ -2,60 +2,23 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
-from dms_core.errors import DmsError, both_ends, extra
-from dms_core.files.output_file import write_bytes
+from dms_core.figures import require_matplotlib, write_figure
 
-P = ParamSpec("P")
-R = TypeVar("R")
 RESOLUTION = 150
 """Resolution of the figures [dots per inch]."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 """Colours of curves in turn, distinct for colour-blind readers (Okabe and Ito 2008)."""
 DASHES = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)))
 """Dashes of curves in turn; with seven colours the same line comes again after 28."""
-FORMATS = (".png", ".svg", ".pdf")
-"""Endings of pictures that can be written."""
 DIVISIONS = ((2.5, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)), (10.0, (1.0, 2.0, 5.0)), (300.0, (1.0, 3.0)))
 """Ratios of the ends of a logarithmic axis, and the places with labels in a decade up to each; beyond, its ends."""
 LETTERS_AN_INCH = 14.0
 """Letters of a note that fit into an inch."""
-
-
-def require_matplotlib() -> None:
-    """Refuse a run whose figures could not be drawn, before it begins.
-
-    Raises:
-        DmsError: matplotlib is missing, or the user's settings of it are not usable.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise DmsError(f"figures need matplotlib. {extra('pictures')}") from None
-    except ValueError as error:
-        raise DmsError(
-            f"matplotlib cannot be imported: {both_ends(str(error), 300)}. Look at the environment variable MPLBACKEND."
-        ) from None
-
-
-def drawn(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorator: draw with matplotlib's own settings, whatever a user's matplotlibrc says."""
-
-    @wraps(function)
-    def draw(*args: P.args, **kwargs: P.kwargs) -> R:
-        require_matplotlib()
-        import matplotlib.style
-
-        with matplotlib.style.context("default"):
-            return function(*args, **kwargs)
-
-    return draw
 
 
 def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Any, Any]:
@@ -153,9 +116,4 @@ def save(figure: Any, path: Path) -> Path:
             letter(figure, ax), (0.0, 1.0), xytext=(-8.0, 5.0), xycoords="axes fraction", textcoords="offset points",
             ha="right", va="bottom", fontweight="bold", fontsize=11,
         )  # fmt: skip
-    picture = io.BytesIO()
-    # Without the day, so that the same figure is the same file.
-    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-    figure.savefig(picture, format=path.suffix.removeprefix("."), metadata=metadata)
-    write_bytes(path, picture.getvalue())
-    return path
+    return write_figure(figure, path)

@@ -13,10 +13,11 @@ import numpy as np
 from dms_core import Model, SolverOptions
 from dms_core.analyses import follow_path, inverse_dynamics, motion_of, static_equilibrium, static_optimisation
 from dms_core.analyses.pictures import draw_modes
+from dms_core.figures import drawn
 from dms_core.model import Constant
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.paper.scenarios import load_scenarios, run
-from exo_env.rendering.panels import COLOURS, drawn, legend, panels, save
+from exo_env.rendering.panels import COLOURS, legend, panels, save
 from tests.dms_core.analyses.mechanisms import von_mises_truss
 
 WEIGHTS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)

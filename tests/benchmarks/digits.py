@@ -25,7 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from dms_core import Model, SolverOptions, World
-from exo_env.rendering.panels import COLOURS, drawn, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import COLOURS, panels, save
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.dms_core.literature.motions import MOTIONS

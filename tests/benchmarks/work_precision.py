@@ -23,7 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from dms_core import Model, Simulation, SolverOptions, simulate
-from exo_env.rendering.panels import COLOURS, drawn, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import COLOURS, panels, save
 from exo_env.rendering.quantities import quantity
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from tqdm import tqdm
@@ -10,16 +9,14 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import InputError
+from dms_core.figures import FORMATS, require_matplotlib
 from dms_core.files.outputs import OutputFile, Outputs
-from exo_env.rendering.panels import FORMATS, require_matplotlib
 
-from ...environment import environment_id
+from ...environment import HIDDEN_PLAN, environment_id
 from ...evaluation.episodes.time_course import TimeCourse, time_course
 from ...evaluation.figures.policy_picture import NEEDED, policy_picture
-from ...policies.learned import shipped_policies
-from ..options import device_settings, different_policies
+from ..options import EnvironmentId, device_settings, different_policies, given_folders
 
-HIDDEN_INTENT = "exo/HiddenIntent-v0"
 MOST = 6
 """Policies that fit side by side."""
 
@@ -29,7 +26,7 @@ def picture(
     out: FileOut,
     patient: str = "stroke_severe",
     seed: int = 0,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = HIDDEN_INTENT,
+    environment: EnvironmentId = HIDDEN_PLAN,
     exoskeleton: str | None = None,
     overwrite: bool = False,
 ) -> int:
@@ -51,7 +48,7 @@ def picture(
     require_matplotlib()
     environment_id(environment)
     used, settings = different_policies(policy_names, environment), device_settings(exoskeleton)
-    inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    inputs = [patient, exoskeleton, *given_folders(policy_names)]
     with Outputs("picture", files=[OutputFile("--out", out)], inputs=inputs, overwrite=overwrite) as outputs:
         ones: list[TimeCourse] = []
         for one in tqdm(used, unit="policy", leave=False, disable=None):

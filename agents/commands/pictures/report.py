@@ -10,11 +10,11 @@ from tyro.conf import Positional, arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, counted, printable
+from dms_core.figures import require_matplotlib
 from dms_core.files.json_text import brief
 from dms_core.files.output_file import markdown_cell, write_text
 from dms_core.files.outputs import Outputs
 from exo_env.patient.population import population, shipped_populations
-from exo_env.rendering.panels import require_matplotlib
 
 from ...environment import ENVIRONMENT, check_settings, environment_id
 from ...evaluation.episodes.time_course import TimeCourse, time_course

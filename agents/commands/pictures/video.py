@@ -25,9 +25,8 @@ from exo_env.rendering.scene import Scene
 from ...environment import ENVIRONMENT, environment_id
 from ...evaluation.episodes.episode import world_of
 from ...evaluation.episodes.playing import Playing
-from ...policies.learned import shipped_policies
 from ...policies.policy import Policy
-from ..options import device_settings, different_policies, repeated
+from ..options import EnvironmentId, device_settings, different_policies, given_folders, repeated
 
 BAND, FONT, MOST, SIZE = 60, 18, 4, 480
 """Height of the titles, size of their letters, policies that fit side by side, and width of each of them [pixel]."""
@@ -46,7 +45,7 @@ def video(
     patient: str = "stroke_severe",
     seed: int = 0,
     repetitions: int | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
+    environment: EnvironmentId = ENVIRONMENT,
     exoskeleton: str | None = None,
     overwrite: bool = False,
 ) -> int:
@@ -70,7 +69,7 @@ def video(
     used = different_policies(policy_names, environment)
     settings = device_settings(exoskeleton) | repeated(used, repetitions)
     out = _possible(out)
-    inputs = [patient, exoskeleton, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    inputs = [patient, exoskeleton, *given_folders(policy_names)]
     with Outputs("video", files=[OutputFile("--out", out)], inputs=inputs, overwrite=overwrite) as outputs:
         _film(out, [Stage(policy, patient, seed, environment, **settings) for policy in used])
     print(f"written: {outputs.where(out)}")

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import Annotated
-
-from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
-from dms_core.errors import counted, printable
+from dms_core.errors import counted
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs
 
-from ...environment import PROGRAM
+from ...environment import HIDDEN_PLAN, PROGRAM
+from ...evaluation.results.tables import records_text
 from ...evaluation.search.hindsight import hindsight as tried
 from ...evaluation.search.hindsight import summed_up, tuned_difference
 from ...evaluation.search.tries import KeptTries, Try, beside
 from ...evaluation.search.tuning import tunable
-from ..options import check_hides_plan
+from ..options import EnvironmentId, check_hides_plan
 from .kept_search import kept_search
 
-USUAL = "exo/HiddenIntent-v0"
 CLOCK, ANGLE = "mean_clock", "mean_angle"
 """Policies whose difference says what a clock is worth."""
 
@@ -36,7 +31,7 @@ def hindsight(
     seed: int = 0,
     workers: int = 1,
     address: str | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = USUAL,
+    environment: EnvironmentId = HIDDEN_PLAN,
     overwrite: bool = False,
 ) -> int:
     """Try many numbers of each classical policy on each patient, and write what the best of them reach.
@@ -54,7 +49,7 @@ def hindsight(
         environment: in which, by id; one whose task hides the patient's plan.
         overwrite: replace a file of this name.
     """
-    check_hides_plan(environment, USUAL)
+    check_hides_plan(environment, HIDDEN_PLAN)
     command = f"{PROGRAM} hindsight --population {shlex.quote(population)} --patients {patients} --tries {tries}"
     command += f" --seed {seed} --env {environment}"
     done: dict[str, list[Try]] = {}
@@ -90,13 +85,13 @@ def _cell(estimate: Mapping[str, float]) -> str:
 
 def _table(done: Mapping[str, Sequence[Try]], command: str) -> str:
     """A row for each policy and patient, below a line with the command."""
-    text = io.StringIO()
-    text.write(f"# {printable(command)}\n")
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["policy", "seed", "tuned_return", "hindsight_return", "numbers"])
+    records = []
     for name, ones in done.items():
         for seed in ones[0].measures:
             best = max(ones, key=lambda one: one.measures[seed])
             numbers = " ".join(f"{key}={value:g}" for key, value in best.numbers.items())
-            rows.writerow([name, seed, f"{ones[0].measures[seed]:.4g}", f"{best.measures[seed]:.4g}", numbers])
-    return text.getvalue()
+            tuned, most = (f"{one.measures[seed]:.4g}" for one in (ones[0], best))
+            records.append({
+                "policy": name, "seed": seed, "tuned_return": tuned, "hindsight_return": most, "numbers": numbers
+            })  # fmt: skip
+    return records_text(records, command)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
-
-from tyro.conf import arg
+from typing import Any
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.config_files import configs
@@ -19,7 +17,7 @@ from ...evaluation.comparison.opponents import RETURNS
 from ...evaluation.search.tries import KeptTries, Try, beside, table
 from ...evaluation.search.tuning import POPULATION, tunable, tune, untuned
 from ...policies.tuned import FILE, HIDDEN_INTENT
-from ..options import device_settings
+from ..options import EnvironmentId, device_settings
 from .kept_search import kept_search
 
 
@@ -32,7 +30,7 @@ def tune_baselines(
     workers: int = 1,
     address: str | None = None,
     out: FolderOut | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
+    environment: EnvironmentId = ENVIRONMENT,
     exoskeleton: str | None = None,
     overwrite: bool = False,
 ) -> int:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from typing import Annotated
 
 import numpy as np
 from tqdm import tqdm
-from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FileOut
 from dms_core.errors import Stopped, counted
@@ -19,7 +17,7 @@ from ...evaluation.comparison.evaluate import check_numbers
 from ...evaluation.results.tables import records_text
 from ...evaluation.search.upper_bound import Tried, best_together
 from ...evaluation.search.upper_bound import upper_bound as bound
-from ..options import device_settings
+from ..options import EnvironmentId, device_settings
 
 WHOLE = ("seed", "repetitions")
 """Columns of whole numbers."""
@@ -31,7 +29,7 @@ def upper_bound(
     patients: int = 24,
     repetitions: int = 1,
     seed: int = 0,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
+    environment: EnvironmentId = ENVIRONMENT,
     exoskeleton: str | None = None,
     overwrite: bool = False,
 ) -> int:

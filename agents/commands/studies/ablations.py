@@ -5,9 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
-
-from tyro.conf import arg
+from typing import Any
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, counted, printable
@@ -15,7 +13,7 @@ from dms_core.files.output_file import markdown_cell, write_text
 from dms_core.files.outputs import Outputs
 
 from ...distributed.variations import folder_of, read_variations
-from ...environment import PROGRAM
+from ...environment import HIDDEN_PLAN, PROGRAM
 from ...evaluation.comparison.evaluate import Plan
 from ...evaluation.comparison.opponents import opponent_of, oracle_name, with_opponents
 from ...evaluation.results.key_figures import FIGURES, HEADS, MEANS, cells, columns, key_figures, measured_episodes
@@ -23,10 +21,9 @@ from ...evaluation.results.tables import records_text
 from ...evaluation.sharing.kept_shares import forget
 from ...policies.learned import find_policy
 from ...policies.policy import Policy
-from ..options import check_hides_plan
+from ..options import EnvironmentId, check_hides_plan
 from .kept_cells import run_cells
 
-USUAL = "exo/HiddenIntent-v0"
 Row = tuple[str, int, str, dict[str, dict[str, Any]]]
 """Name, number of trainings, opponent, and figures."""
 
@@ -42,7 +39,7 @@ def ablations(
     seed: int = 1,
     workers: int = 1,
     address: str | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = USUAL,
+    environment: EnvironmentId = HIDDEN_PLAN,
     overwrite: bool = False,
 ) -> int:
     """Evaluate what `sweep --variations` trained, all on the same patients: ablations.csv and ablations.md.
@@ -66,7 +63,7 @@ def ablations(
     """
     if not seeds or len(set(seeds)) < len(seeds):
         raise InputError(f"--seeds {' '.join(map(str, seeds))}: expected one or more different seeds.")
-    check_hides_plan(environment, USUAL)
+    check_hides_plan(environment, HIDDEN_PLAN)
     names = [one.name for one in read_variations(variations)]
     trained = {name: [find_policy(str(folder_of(runs, name, k))) for k in seeds] for name in names}
     everyone = with_opponents([one for ones in trained.values() for one in ones], environment)
@@ -88,7 +85,7 @@ def _options(plan: Plan, population: str) -> str:
     """Options that say what is evaluated, as they are typed."""
     options = f"--population {shlex.quote(population)} --patients {plan.patients} --seed {plan.seed}"
     options += f" --loads {' '.join(f'{x:g}' for x in plan.loads)}" if plan.loads else ""
-    return options + (f" --env {plan.environment}" if plan.environment != USUAL else "")
+    return options + (f" --env {plan.environment}" if plan.environment != HIDDEN_PLAN else "")
 
 
 def _rows(

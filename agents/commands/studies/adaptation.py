@@ -2,40 +2,34 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, counted, printable
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import markdown_cell, write_text
 from dms_core.files.outputs import Outputs
-from exo_env.rendering.panels import require_matplotlib
 
 from ...environment import PROGRAM
 from ...evaluation.comparison.evaluate import Plan
 from ...evaluation.comparison.opponents import with_opponents
 from ...evaluation.figures.line_figures import Curve, draw_panels, line_titles
-from ...evaluation.results.tables import cell
+from ...evaluation.results.tables import cell, records_text
 from ...evaluation.sharing.kept_shares import forget
 from ...evaluation.studies.adaptation import Adaptation, best_of, hindsight_set, window_returns, windows_of
 from ...evaluation.studies.adaptation import adaptation as adapted
-from ...policies.learned import shipped_policies
 from ...policies.policy import Policy
-from ..options import check_hides_plan, different_policies
+from ..options import EnvironmentId, PolicyNames, check_hides_plan, different_policies, given_folders
 from .kept_cells import run_cells
 
 USUAL = "exo/NewPatient-v0"
 
 
 def adaptation(
-    policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
+    policy_names: PolicyNames,
     out: FolderOut,
     population: str = "evaluation",
     patients: int = 40,
@@ -43,7 +37,7 @@ def adaptation(
     seed: int = 1,
     workers: int = 1,
     address: str | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = USUAL,
+    environment: EnvironmentId = USUAL,
     overwrite: bool = False,
 ) -> int:
     """Run policies with new patients: return and regret of each window in adaptation.csv, .md and .png.
@@ -70,7 +64,7 @@ def adaptation(
     require_matplotlib()
     used = with_opponents(different_policies(policy_names, environment), environment)
     plan, behind = Plan(population, patients, seed, (), environment), hindsight_set(environment, tries, seed)
-    inputs: list[str | Path] = [population, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    inputs: list[str | Path] = [population, *given_folders(policy_names)]
     command = f"{PROGRAM} adaptation --policy {shlex.join(policy_names)} --population {shlex.quote(population)}"
     command += f" --patients {patients} --tries {tries} --seed {seed} --env {environment}"
     with Outputs("adaptation", folder=out, inputs=inputs, overwrite=overwrite) as outputs:
@@ -99,16 +93,13 @@ def _lines(found: Mapping[str, Adaptation]) -> list[str]:
 
 def _numbers(found: Mapping[str, Adaptation], patients: int, command: str) -> str:
     """A row a policy and window, below a line with the command."""
-    text = io.StringIO()
-    text.write(f"# {printable(command)}\n")
-    rows = csv.writer(text, lineterminator="\n")
     ends = [f"{name}{end}" for name in ("return", "regret") for end in ("", "_low", "_high")]
-    rows.writerow(["policy", "patients", "window", *ends])
+    records = []
     for name, one in found.items():
         for k, (returned, regret) in enumerate(zip(one.returns, one.regrets, strict=True), 1):
             numbers = [f"{x:.5g}" for e in (returned, regret) for x in (e.value, e.low, e.high)]
-            rows.writerow([name, patients, k, *numbers])
-    return text.getvalue()
+            records.append({"policy": name, "patients": patients, "window": k, **dict(zip(ends, numbers, strict=True))})
+    return records_text(records, command)
 
 
 def _text(found: Mapping[str, Adaptation], plan: Plan, tried: int, windows: int, command: str) -> str:

@@ -11,11 +11,11 @@ from tyro.conf import arg
 
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, choices, counted, printable
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import markdown_cell, write_text
 from dms_core.files.outputs import Outputs
-from exo_env.rendering.panels import require_matplotlib
 
-from ...environment import PROGRAM
+from ...environment import HIDDEN_PLAN, PROGRAM
 from ...evaluation.comparison.evaluate import Plan
 from ...evaluation.comparison.opponents import opponent_of, oracle_name, with_opponents
 from ...evaluation.figures.line_figures import Curve, draw_panels, line_titles
@@ -23,27 +23,29 @@ from ...evaluation.results.key_figures import FIGURES, HEADS, MEANS, cells, colu
 from ...evaluation.results.tables import records_text
 from ...evaluation.sharing.kept_shares import Cell, forget
 from ...evaluation.studies.shift import SHIFTS
-from ...policies.learned import shipped_policies
 from ...policies.policy import Policy
-from ..options import check_hides_plan, different_policies
+from ..options import EnvironmentId, PolicyNames, check_hides_plan, different_policies, given_folders
 from .kept_cells import run_cells
 
-USUAL = "exo/HiddenIntent-v0"
 FAULTS = "Faults of sensors reach the policies that read these sensors; to others it is the same episode again."
+ShiftNames = Annotated[
+    tuple[str, ...],
+    arg(metavar="NAME [NAME ...]", help=f"{', '.join(SHIFTS)}; all of them where none is given."),
+]
 Row = tuple[str, float, Policy, dict[str, dict[str, Any]]]
 """Shift, size, policy and its figures."""
 
 
 def shift(
-    policy_names: Annotated[tuple[str, ...], arg(name="policy", metavar="NAME [NAME ...]")],
+    policy_names: PolicyNames,
     out: FolderOut,
-    shifts: Annotated[tuple[str, ...], arg(metavar="NAME [NAME ...]")] = (),
+    shifts: ShiftNames = (),
     population: str = "mixed",
     patients: int = 20,
     seed: int = 1,
     workers: int = 1,
     address: str | None = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = USUAL,
+    environment: EnvironmentId = HIDDEN_PLAN,
     overwrite: bool = False,
 ) -> int:
     """Run policies under shifts away from training, of several sizes each: shift.csv, shift.md and shift.png.
@@ -54,8 +56,7 @@ def shift(
     Args:
         policy_names: names of the command `policies`, folders of trained ones, or module:Class.
         out: folder for the results; made where it is missing.
-        shifts: hinge_offset, hinge_tilt, sensor_noise, sensor_delay, electrode_faults, patients, load; all of them
-            where none is given.
+        shifts: by name; all of them where none is given.
         population: of the patients without a shift, by name or YAML file.
         patients: how many, the same in every cell.
         seed: of the patients and of the bootstrap; another one than that of a training.
@@ -65,13 +66,13 @@ def shift(
         overwrite: replace files in the folder that others wrote or changed.
     """
     _check(policy_names, shifts)
-    check_hides_plan(environment, USUAL)
+    check_hides_plan(environment, HIDDEN_PLAN)
     require_matplotlib()
     used = with_opponents(different_policies(policy_names, environment), environment)
     plan = Plan(population, patients, seed, (), environment)
     keys = [(name, size, one) for name in shifts or SHIFTS for size in SHIFTS[name].sizes for one in used]
     planned: list[Cell] = [(one, SHIFTS[name].plan(plan, one, size)) for name, size, one in keys]
-    inputs: list[str | Path] = [population, *(Path(name) for name in policy_names if name not in shipped_policies())]
+    inputs: list[str | Path] = [population, *given_folders(policy_names)]
     command = f"{PROGRAM} shift --policy {shlex.join(policy_names)} --population {shlex.quote(population)}"
     command += f" --shifts {' '.join(shifts)}" if shifts else ""
     command += f" --patients {patients} --seed {seed} --env {environment}"

@@ -16,6 +16,7 @@ from ...environment import ENVIRONMENT
 from ...export.model_zip import from_zip
 from ...policies.learned import DESCRIPTION, LearnedPolicy
 from ...training.files.run_folder import RECORD, RunFolder
+from ..options import EnvironmentId
 
 ONNX = "policy.onnx"
 
@@ -29,7 +30,7 @@ def export(
     statistics: Path | None = None,
     algorithm: str = "ppo",
     action_mode: Annotated[str | None, arg(metavar="MODE")] = None,
-    environment: Annotated[str, arg(name="env", metavar="ID")] = ENVIRONMENT,
+    environment: EnvironmentId = ENVIRONMENT,
     overwrite: bool = False,
 ) -> int:
     """Write a trained policy as policy.json, weights.safetensors and policy.onnx.

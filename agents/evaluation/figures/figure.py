@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import COLOURS, drawn, literal, log_scale, note, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import COLOURS, literal, log_scale, note, panels, save
 from exo_env.rendering.quantities import quantity
 
 from ..episodes.measures import MEASURES, Measure

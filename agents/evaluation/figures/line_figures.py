@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from exo_env.rendering.panels import COLOURS, DASHES, drawn, legend, literal, note, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import COLOURS, DASHES, legend, literal, note, panels, save
 
 from ...policies.policy import Policy
 

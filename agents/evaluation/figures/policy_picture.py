@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from exo_env.rendering.panels import COLOURS, drawn, legend, literal, note, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import COLOURS, legend, literal, note, panels, save
 
 from ..episodes.time_course import TimeCourse
 from .marks import GONE, end_sentence, mark_end, mark_load_steps

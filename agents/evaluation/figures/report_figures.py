@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import counted
-from exo_env.rendering.panels import COLOURS, drawn, legend, literal, log_scale, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import COLOURS, legend, literal, log_scale, panels, save
 
 CURVES = (
     ("return", "return of an episode"),

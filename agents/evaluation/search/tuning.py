@@ -12,7 +12,6 @@ from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from dms_core.errors import InputError
 
@@ -165,6 +164,9 @@ def untuned(patients: int, seed: int, *, population: str, environment: str, **se
 
 def first_places(dimensions: int, count: int, generator: np.random.Generator) -> np.ndarray:
     """A Latin hypercube, shape (count, dimensions), from 0 to 1."""
+    # A large package, which commands that search nothing do without.
+    from scipy.stats import qmc
+
     return qmc.LatinHypercube(dimensions, rng=generator).random(count)
 
 

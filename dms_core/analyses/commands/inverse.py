@@ -14,7 +14,7 @@ from dms_core.analyses.inverse import InverseResult, inverse_dynamics
 from dms_core.analyses.static_optimisation import static_optimisation
 from dms_core.command_line import FileOut, bar_of_run, moves
 from dms_core.errors import InputError, SimulationError, choices
-from dms_core.files.csv_table import check_times, read_table
+from dms_core.files.csv_table import check_times, column_names, read_table
 from dms_core.files.output_file import check_columns, write_csv, write_json
 from dms_core.files.outputs import Outputs
 from dms_core.model.constraints import Revolute, Slider
@@ -100,7 +100,7 @@ def _motion(system: System, path: Path | None, cutoff: float | None) -> tuple[di
         return {}, None
     times = read_table(path, ("time_s",))
     check_times(times, "time_s", times.column("time_s"), None)
-    heads = read_heads(path)
+    heads = column_names(path)
     joints = [e.name for e in (*system.constraints, *system.sensors) if isinstance(e, Revolute | Slider | JointAngle)]
     named: dict[str, str] = {}
     for column in heads:
@@ -120,13 +120,6 @@ def _motion(system: System, path: Path | None, cutoff: float | None) -> tuple[di
         unit = column.rpartition("_")[2] if column.endswith(("_deg", "_mm")) else None
         found[name] = Table(file=str(path), column=column, unit=unit, interpolation="quintic", cutoff=cutoff)
     return found, times.column("time_s")
-
-
-def read_heads(path: Path) -> list[str]:
-    """Names of the columns of a table."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        line = file.readline().rstrip("\r\n")
-    return [cell.strip().strip('"') for cell in line.split(max(",;\t", key=line.count))]
 
 
 def _statistics(result: InverseResult) -> dict[str, object]:

@@ -17,7 +17,7 @@ from dms_core.files.output_file import check_columns, check_size, with_unit, wri
 from dms_core.files.outputs import Outputs
 from dms_core.model.constraints import AngleDriver
 from dms_core.model_tables import columns, compiled, heads
-from dms_core.results import States
+from dms_core.results import States, regular_times
 
 
 def kinematic(
@@ -72,9 +72,7 @@ def sample_times(model: Model, start: float, end: float, sample: float) -> np.nd
     if not (np.isfinite(sample) and 0.0 < sample <= end - start):
         raise InputError(f"--sample: Expected a positive time of at most {end - start:g} s, got {sample}.")
     check_size("--sample", end - start, sample, len(heads(model)) + model.n_q + 2 * model.n_phi)
-    times = start + np.arange(int(np.floor((end - start) / sample * (1.0 + 1e-12))) + 1) * sample
-    times = np.minimum(times, end)
-    return times if end - times[-1] < 1e-9 * sample else np.append(times, end)
+    return regular_times(start, end, sample)
 
 
 def driven_table(states: States) -> dict[str, np.ndarray]:

@@ -11,11 +11,12 @@ from tyro.conf import Positional
 
 from dms_core.analyses.commands.ending import ended, gave_up, output_files
 from dms_core.analyses.linearise import Linearisation, Mode, linearise
-from dms_core.analyses.pictures import draw_modes, require_matplotlib
+from dms_core.analyses.pictures import draw_modes
 from dms_core.analyses.static import static_equilibrium
 from dms_core.assembly.model import Model
 from dms_core.command_line import FileOut
 from dms_core.errors import SimulationError
+from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_csv, write_json
 from dms_core.files.outputs import Outputs
 from dms_core.model_tables import compiled

@@ -98,6 +98,13 @@ def test_the_command_writes_a_row_a_size_and_policy(tmp_path, capsys):
     assert "| 5 | oracle |" in (out / "shift.md").read_text()
 
 
+def test_the_help_names_every_shift(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["shift", "--help"])
+    words = capsys.readouterr().out.replace(",", " ").replace(";", " ").split()
+    assert end.value.code == 0 and "cuff" in words and set(SHIFTS) <= set(words)
+
+
 @pytest.mark.slow
 def test_ray_gives_the_same(tmp_path):
     pytest.importorskip("ray")

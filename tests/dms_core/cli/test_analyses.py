@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
-from pathlib import Path
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from dms_core.command_line import FAILED_RUN, USER_MISTAKE
-from dms_core.config_files import config_file
+from dms_core.config_files import config_file, configs
 from dms_core.model_file import dump
 from tests.dms_core.analyses.mechanisms import von_mises_truss
+from tests.dms_core.cli.tables import read
 
 PENDULUM = config_file("models/pendulum.yaml")
 FOUR_BAR = config_file("models/four_bar.yaml")
 SPRING = config_file("models/spring_mass.yaml")
 ATWOOD = config_file("models/atwood.yaml")
-
-
-def read(path: Path) -> dict[str, np.ndarray]:
-    """A CSV table by column."""
-    with path.open(newline="") as file:
-        names, *rows = csv.reader(file)
-    return dict(zip(names, np.array(rows, float).T, strict=True))
 
 
 class TestStatic:
@@ -152,6 +147,13 @@ class TestInverse:
         done = command("inverse", PENDULUM, "--out", tmp_path / "x.csv", *options)
         assert done.status == USER_MISTAKE and said in done.err
 
+    def test_names_of_columns_may_hold_the_separator(self, command, tmp_path):
+        model, motion = tmp_path / "pendulum.yaml", tmp_path / "motion.csv"
+        model.write_text(PENDULUM.read_text().replace("name: swing", 'name: "swing, left"'))
+        motion.write_text('time_s,"a note, not read","swing, left_deg"\n' + "".join(f"0.{k},,{k}\n" for k in range(9)))
+        done = command("inverse", model, "--motion", motion, "--out", tmp_path / "x.csv")
+        assert done.status == 0 and "load of swing, left: " in done.out
+
     def test_muscles_are_asked_for_where_there_are_none(self, command, tmp_path):
         motion = tmp_path / "motion.csv"
         motion.write_text("time_s,swing_deg\n" + "".join(f"{0.1 * k},{k}\n" for k in range(20)))
@@ -184,6 +186,16 @@ class TestModes:
     def test_a_picture_of_no_kind(self, command, tmp_path):
         done = command("modes", PENDULUM, "--out", tmp_path / "modes.csv", "--pictures", tmp_path / "modes.txt")
         assert done.status == USER_MISTAKE and "Expected a name that ends with .png, .svg, .pdf" in done.err
+
+    def test_an_unknown_backend_is_named_before_the_analysis(self, tmp_path):
+        pytest.importorskip("matplotlib")
+        options = ["--out", tmp_path / "modes.csv", "--pictures", tmp_path / "modes.png"]
+        done = subprocess.run(
+            [sys.executable, "-m", "dms_core", "modes", PENDULUM, *options], cwd=configs().parent,
+            env=os.environ | {"MPLBACKEND": "nonsense"}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == USER_MISTAKE and list(tmp_path.iterdir()) == []
+        assert done.stderr.startswith("error: matplotlib cannot be imported") and "'nonsense'" in done.stderr
 
 
 @pytest.mark.parametrize("name", ["static", "kinematic", "inverse", "modes"])

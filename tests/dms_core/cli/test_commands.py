@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import math
@@ -22,17 +21,11 @@ from dms_core.config_files import config_file, configs
 from dms_core.files.output_file import with_unit, write_csv, write_file
 from dms_core.model_file import load
 from dms_core.schema import reference
+from tests.dms_core.cli.tables import read
 
 ROOT = configs().parent
 PENDULUM = config_file("models/pendulum.yaml")
 FOUR_BAR = config_file("models/four_bar.yaml")
-
-
-def read(path: Path) -> dict[str, np.ndarray]:
-    """A CSV table by column."""
-    with path.open(newline="") as file:
-        names, *rows = csv.reader(file)
-    return dict(zip(names, np.array(rows, float).T, strict=True))
 
 
 class TestCheck:

@@ -16,7 +16,8 @@ pytest.importorskip("matplotlib")
 DRAW = """
 import sys
 from pathlib import Path
-from exo_env.rendering.panels import drawn, panels, save
+from dms_core.figures import drawn
+from exo_env.rendering.panels import panels, save
 
 @drawn
 def draw(path):
