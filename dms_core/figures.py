@@ -47,6 +47,26 @@ def drawn(function: Callable[P, R]) -> Callable[P, R]:
     return draw
 
 
+def visible(figure: Any) -> list[Any]:
+    """The panels of a figure that are shown, in the order of their letters."""
+    return [ax for ax in figure.axes if ax.get_visible()]
+
+
+def letter(figure: Any, ax: Any) -> str:
+    """Letter of a panel, by which notes name it."""
+    return chr(ord("a") + visible(figure).index(ax))
+
+
+def put_letters(figure: Any) -> None:
+    """Give the panels of a figure their letters, if there are several."""
+    shown = visible(figure)
+    for ax in shown if len(shown) > 1 else ():
+        ax.annotate(
+            letter(figure, ax), (0.0, 1.0), xytext=(-8.0, 5.0), xycoords="axes fraction", textcoords="offset points",
+            ha="right", va="bottom", fontweight="bold", fontsize=11,
+        )  # fmt: skip
+
+
 def write_figure(figure: Any, path: Path) -> Path:
     """Write a picture whole or not at all, as its name ends."""
     picture = io.BytesIO()

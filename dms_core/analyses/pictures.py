@@ -17,7 +17,7 @@ from dms_core.analyses.linearise import Linearisation, Mode
 from dms_core.analyses.motion_names import rotate
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError
-from dms_core.figures import FORMATS, drawn, write_figure
+from dms_core.figures import FORMATS, drawn, put_letters, write_figure
 from dms_core.model.element import GROUND
 from dms_core.model.geometry.path import PathPoint
 
@@ -134,7 +134,20 @@ def draw_modes(path: Path, linear: Linearisation, modes: Sequence[Mode] | None =
         _draw(ax, linear, mode)
     for ax in list(panels.flat)[len(shown) :]:
         ax.set_visible(False)
+    _legend(sheet)
+    put_letters(sheet)
     return write_figure(sheet, path)
+
+
+def _legend(sheet: Any) -> None:
+    """Name the colours, above the panels."""
+    from matplotlib.lines import Line2D
+
+    names = {"at rest": REST, "one end of the swing": FORTH, "its other end": BACK}
+    sheet.legend(
+        handles=[Line2D([], [], color=colour, label=name) for name, colour in names.items()],
+        loc="outside upper center", ncols=3, frameon=False, fontsize=8,
+    )  # fmt: skip
 
 
 def _sway(linear: Linearisation, mode: Mode) -> float:
@@ -157,7 +170,7 @@ def _draw(ax: Any, linear: Linearisation, mode: Mode) -> None:
         _stroke(ax, lines(model, moved), axes, colour, depth)
     _stroke(ax, rest, axes, REST, 1)
     swing = f"{mode.damped_frequency:.3g} Hz" if mode.damped_frequency else f"{mode.time_constant:.3g} s"
-    ax.set_title(f"{swing}, damping {mode.damping:.3g}", fontsize=9)
+    ax.set_title(f"{swing}, damping ratio {mode.damping:.3g}", fontsize=9)
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.margins(0.08)

@@ -14,7 +14,8 @@ from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.paper.scenarios import ScenarioRun
 from exo_env.paper.summary import SHOWN_MUSCLES, SHOWN_ROPES, magnitude
 from exo_env.rendering.curves import Curve, difference, draw, told, told_apart
-from exo_env.rendering.panels import COLOURS, DASHES, legend, letter, note, panels, save
+from dms_core.figures import letter
+from exo_env.rendering.panels import COLOURS, DASHES, legend, note, panels, save
 from exo_env.rendering.quantities import quantity
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dms_core.figures import require_matplotlib, write_figure
+from dms_core.figures import put_letters, require_matplotlib, visible, write_figure
 
 RESOLUTION = 150
 """Resolution of the figures [dots per inch]."""
@@ -34,16 +34,6 @@ def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) ->
         ax.grid(True, color="0.9", linewidth=0.6)
         ax.spines[["top", "right"]].set_visible(False)
     return figure, axes
-
-
-def visible(figure: Any) -> list[Any]:
-    """The panels of a figure that are shown, in the order of their letters."""
-    return [ax for ax in figure.axes if ax.get_visible()]
-
-
-def letter(figure: Any, ax: Any) -> str:
-    """Letter of a panel, by which notes name it."""
-    return chr(ord("a") + visible(figure).index(ax))
 
 
 def legend(figure: Any, columns: int, order: Sequence[str] = ()) -> None:
@@ -109,11 +99,6 @@ def literal(text: str) -> str:
 
 def save(figure: Any, path: Path) -> Path:
     """Write a picture whole or not at all, as its name ends; several panels get letters, which no title reaches."""
-    shown = visible(figure)
     _break_titles(figure)
-    for ax in shown if len(shown) > 1 else ():
-        ax.annotate(
-            letter(figure, ax), (0.0, 1.0), xytext=(-8.0, 5.0), xycoords="axes fraction", textcoords="offset points",
-            ha="right", va="bottom", fontweight="bold", fontsize=11,
-        )  # fmt: skip
+    put_letters(figure)
     return write_figure(figure, path)

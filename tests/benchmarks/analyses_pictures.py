@@ -77,7 +77,7 @@ def inverse(path: Path) -> None:
         k = found.muscles.index(name)
         right.plot(times, y[f"{name}.sensor.activation"], color="0.75", linewidth=5)
         right.plot(times, found.activations[:, k], color=colour, label=f"{name}, found")
-    right.set_ylabel("activation")
+    right.set_ylabel("activation [-]")
     for ax in (left, right):
         ax.set_xlabel("time [s]")
     legend(figure, 6)

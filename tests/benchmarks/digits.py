@@ -26,7 +26,7 @@ import numpy as np
 
 from dms_core import Model, SolverOptions, World
 from dms_core.figures import drawn
-from exo_env.rendering.panels import COLOURS, panels, save
+from exo_env.rendering.panels import COLOURS, legend, panels, save
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.dms_core.literature.motions import MOTIONS
@@ -173,9 +173,9 @@ def draw(path: Path, rows: Sequence[Row]) -> None:
             if points:
                 ax.loglog(*zip(*points, strict=True), style, ms=4, lw=1, color=COLOURS[k], label=method)
         ax.set(ylabel=label if j == 0 else "", title=name if work == "steps" else "")
-        ax.set(xlabel="error" if work == "ms" else "")
+        ax.set(xlabel="largest error [m, rad or -]" if work == "ms" else "")
         ax.grid(alpha=0.3)
-    axes[0, 0].legend(fontsize=8)
+    legend(figure, 4)
     save(figure, path)
 
 

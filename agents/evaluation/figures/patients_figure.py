@@ -10,7 +10,8 @@ import numpy as np
 
 from dms_core.figures import drawn
 from exo_env.rendering.curves import Curve, difference, draw, told, told_apart
-from exo_env.rendering.panels import COLOURS, legend, letter, literal, note, panels, save
+from dms_core.figures import letter
+from exo_env.rendering.panels import COLOURS, legend, literal, note, panels, save
 
 from ..episodes.time_course import TimeCourse
 from .marks import end_sentence, mark_end, mark_load_steps

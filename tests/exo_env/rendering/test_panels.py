@@ -9,7 +9,8 @@ import sys
 import pytest
 
 from dms_core.config_files import configs
-from exo_env.rendering.panels import legend, letter, log_scale, note, save
+from dms_core.figures import letter
+from exo_env.rendering.panels import legend, log_scale, note, save
 
 pytest.importorskip("matplotlib")
 
