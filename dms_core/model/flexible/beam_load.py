@@ -10,9 +10,7 @@ import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.flexible.beam_element import (
-    AXES,
     BEAM,
-    PARAMETERS,
     STILL3,
     STILL4,
     BeamElement,
@@ -24,7 +22,8 @@ from dms_core.model.flexible.beam_element import (
     second_turn,
     sections,
 )
-from dms_core.model.geometry.rotations import vec
+from dms_core.model.geometry.quaternions import PARAMETERS, conjugate, product
+from dms_core.model.geometry.rotations import AXES, vec
 
 
 @compiled
@@ -57,7 +56,7 @@ def _moment_derivatives(par, q, v, Yq, Yv):
     sign, tau, stiffness = near_sign(q), par[BEAM.damping_time], vec(par, BEAM.turning)
     d, m, p, s = sections(q, sign)
     dv, mv, pv, sv = sections(v, sign)
-    c = strain.product(strain.conjugate(p), s)
+    c = product(conjugate(p), s)
     factors, c_rate = strain.turn_factors(c), relative_rate(p, s, pv, sv)
     for n in range(8):
         x, y = (PARAMETERS[n], STILL4) if n < 4 else (STILL4, PARAMETERS[n - 4])

@@ -17,15 +17,12 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
 from dms_core.model.flexible.frame_sums import (
-    AXES,
     FRAME,
     MODE,
     PAIR,
-    UNITS,
     ZERO,
     combined,
     inertia_by,
@@ -44,7 +41,19 @@ from dms_core.model.flexible.frame_sums import (
 )
 from dms_core.model.flexible.modal_data import ModalData
 from dms_core.model.geometry.frames import g_matrix, rotation_matrix
-from dms_core.model.geometry.rotations import add, bilinear, cross, dot, euler_parameters, rotated, scale, sub, vec
+from dms_core.model.geometry.quaternions import PARAMETERS, conjugate
+from dms_core.model.geometry.rotations import (
+    AXES,
+    add,
+    bilinear,
+    cross,
+    dot,
+    euler_parameters,
+    rotated,
+    scale,
+    sub,
+    vec,
+)
 from dms_core.model.places import numbers_at
 
 
@@ -106,13 +115,13 @@ def _put_motion(par, n, q, v, s, dz, dw, da, J, column):
 @compiled
 def _frame_derivatives(par, n, q, v, a, s, f, t, Jq, Jv, Ja):
     """Columns of r, p and their rates."""
-    p, back = euler_parameters(q, 0), strain.conjugate(euler_parameters(q, 0))
+    p, back = euler_parameters(q, 0), conjugate(euler_parameters(q, 0))
     for i in range(3):
         Ja[i, i] += par[FRAME.mass]
         _put_motion(par, n, q, v, s, bilinear(back, back, AXES[i]), ZERO, ZERO, Ja, i)
     for i in range(4):
-        e = UNITS[i]
-        dz = scale(2.0, bilinear(back, strain.conjugate(e), vec(a, 0)))
+        e = PARAMETERS[i]
+        dz = scale(2.0, bilinear(back, conjugate(e), vec(a, 0)))
         dw, da = spin(e, euler_parameters(v, 0)), spin(e, euler_parameters(a, 0))
         _put_motion(par, n, q, v, s, dz, dw, da, Jq, 3 + i)
         g, h = scale(2.0, bilinear(p, e, f)), spin_pull(e, t)

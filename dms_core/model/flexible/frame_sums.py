@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
+from dms_core.model.geometry.quaternions import conjugate, product
 from dms_core.model.geometry.rotations import add, bilinear, euler_parameters, scale, vec
 
 
@@ -41,8 +41,6 @@ class PairNumbers(NamedTuple):
 
 FRAME, MODE, PAIR = FrameNumbers(), ModeNumbers(), PairNumbers()
 MODE_SIZE, PAIR_SIZE = 15, 9
-UNITS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ZERO = (0.0, 0.0, 0.0)
 
 
@@ -74,14 +72,14 @@ def pair_at(n, a, b):
 @compiled
 def spin(p, x):
     """2 G(p) x."""
-    c = strain.product(strain.conjugate(p), x)
+    c = product(conjugate(p), x)
     return (2.0 * c[1], 2.0 * c[2], 2.0 * c[3])
 
 
 @compiled
 def spin_pull(p, t):
     """2 G(p)^T t."""
-    c = strain.product(p, (0.0, t[0], t[1], t[2]))
+    c = product(p, (0.0, t[0], t[1], t[2]))
     return (2.0 * c[0], 2.0 * c[1], 2.0 * c[2], 2.0 * c[3])
 
 
@@ -173,7 +171,7 @@ def rotations_times(par, n, q, x):
 def motion(par, n, q, v, a):
     """The state as the equations need it."""
     p, r_tt = euler_parameters(q, 0), vec(a, 0)
-    back = strain.conjugate(p)
+    back = conjugate(p)
     omega = spin(p, euler_parameters(v, 0))
     return Motion(
         bilinear(back, back, r_tt), omega, spin(p, euler_parameters(a, 0)),

@@ -15,9 +15,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.forces.mass_moment import add_moment_load, first_moment
-from dms_core.model.geometry.rotations import columns, dot, rotated, vec
-
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+from dms_core.model.geometry.rotations import AXES, columns, dot, rotated, vec
 
 
 class GravityNumbers(NamedTuple):

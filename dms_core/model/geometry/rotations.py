@@ -15,6 +15,9 @@ Tuples live in registers: nothing here allocates.
 
 from dms_core.compiled.jit import compiled
 
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""Unit vectors along x, y and z."""
+
 
 @compiled
 def vec(x, k):
