@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.quaternions import conjugate, product
-from dms_core.model.geometry.rotations import add, bilinear, euler_parameters, scale, vec
+from dms_core.model.geometry.rotations import add, bilinear, combination, euler_parameters, scale, vec
 
 
 class FrameNumbers(NamedTuple):
@@ -96,37 +96,26 @@ def sym_times(par, at, w):
 @compiled
 def combined(par, n, place, x):
     """Sum over modes of their triple at `place` times x[7 + a]: P or R_0 times rates, or c less c_0."""
-    s = ZERO
-    for a in range(n):
-        s = add(s, scale(x[7 + a], vec(par, mode_at(a) + place)))
-    return s
+    return combination(ZERO, par, mode_at(0) + place, MODE_SIZE, n, x, 7)
 
 
 @compiled
 def rotation_of(par, n, a, q):
     """R_a at eta."""
-    s = vec(par, mode_at(a) + MODE.rotation)
-    for b in range(n):
-        s = add(s, scale(q[7 + b], vec(par, pair_at(n, b, a) + PAIR.rotation)))
-    return s
+    R_0 = vec(par, mode_at(a) + MODE.rotation)
+    return combination(R_0, par, pair_at(n, 0, a) + PAIR.rotation, PAIR_SIZE * n, n, q, 7)
 
 
 @compiled
 def rotation_rate(par, n, a, x):
     """Sum over b of x[7 + b] R1_b of mode a: Rdot_a for the rates."""
-    s = ZERO
-    for b in range(n):
-        s = add(s, scale(x[7 + b], vec(par, pair_at(n, b, a) + PAIR.rotation)))
-    return s
+    return combination(ZERO, par, pair_at(n, 0, a) + PAIR.rotation, PAIR_SIZE * n, n, x, 7)
 
 
 @compiled
 def rotation_by(par, n, a, x):
     """Sum over b of R1_a of mode b times x[7 + b]: derivative of R x by eta_a."""
-    s = ZERO
-    for b in range(n):
-        s = add(s, scale(x[7 + b], vec(par, pair_at(n, a, b) + PAIR.rotation)))
-    return s
+    return combination(ZERO, par, pair_at(n, a, 0) + PAIR.rotation, PAIR_SIZE, n, x, 7)
 
 
 @compiled

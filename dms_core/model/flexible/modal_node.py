@@ -24,12 +24,12 @@ from dms_core.model.geometry.rotations import (
     add_hessian,
     add_row_hessian,
     columns,
+    combination,
     dot,
     euler_parameters,
     point,
     rotated,
     rotated_rate,
-    scale,
     vec,
 )
 
@@ -56,10 +56,7 @@ def shape(par, k, rotation):
 @compiled
 def shapes_times(par, n, rotation, x):
     """Psi or Theta times the modal part of q or v."""
-    s = (0.0, 0.0, 0.0)
-    for k in range(n):
-        s = add(s, scale(x[FIRST + k], shape(par, k, rotation)))
-    return s
+    return combination((0.0, 0.0, 0.0), par, NODE.shapes + 3 * rotation, 6, n, x, FIRST)
 
 
 @compiled

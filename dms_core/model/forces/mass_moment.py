@@ -9,17 +9,13 @@ A load that turns with the body has g = A g_b. The numbers are c_0, then the col
 """
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import add_hessian, columns, dot, rotated, vec
+from dms_core.model.geometry.rotations import add_hessian, columns, combination, dot, rotated, vec
 
 
 @compiled
 def first_moment(par, at, k, q):
     """c(eta) in body axes; numbers from `at`, k further coordinates."""
-    c = vec(par, at)
-    for n in range(k):
-        P, eta = vec(par, at + 3 + 3 * n), q[7 + n]
-        c = (c[0] + eta * P[0], c[1] + eta * P[1], c[2] + eta * P[2])
-    return c
+    return combination(vec(par, at), par, at + 3, 3, k, q, 7)
 
 
 @compiled

@@ -56,6 +56,14 @@ def cross(a, b):
 
 
 @compiled
+def combination(s, par, at, step, n, x, first):
+    """s + sum_k x[first + k] P_k, k = 0..n - 1, for triples P_k that stand in par from at, `step` numbers apart."""
+    for k in range(n):
+        s = add(s, scale(x[first + k], vec(par, at + step * k)))
+    return s
+
+
+@compiled
 def euler_parameters(x, o):
     """Entries 3..6 of a body's block at offset o (of q, v or vdot), as a 4-tuple."""
     return (x[o + 3], x[o + 4], x[o + 5], x[o + 6])
