@@ -8,6 +8,8 @@ g per mass in ground axes does the work g . (m r + A c), so that, besides m g on
 A load that turns with the body has g = A g_b. The numbers are c_0, then the columns of P.
 """
 
+import numpy as np
+
 from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import add_hessian, columns, combination, dot, rotated, vec
 
@@ -46,3 +48,10 @@ def add_following(par, at, k, g_b, q, Jq):
             Jq[3 + n, 3 + i] -= dot(d[n], turning[i])
         for n in range(k):
             Jq[7 + n, 3 + i] -= dot(rotated(q, 0, vec(par, at + 3 + 3 * n)), turning[i])
+
+
+def moment_pattern(k: int) -> np.ndarray:
+    """Where the derivatives of `add_moment_load` may be non-zero, k further coordinates."""
+    by_q = np.zeros((7 + k, 7 + k), bool)
+    by_q[3:7, 3:] = by_q[3:, 3:7] = True
+    return by_q
