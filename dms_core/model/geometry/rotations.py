@@ -56,6 +56,18 @@ def cross(a, b):
 
 
 @compiled
+def across(x, n):
+    """The part of x across a unit triple n: x - (n . x) n."""
+    return sub(x, scale(dot(n, x), n))
+
+
+@compiled
+def across_change(x, n, dx, dn):
+    """Its change for changes of x and n."""
+    return sub(sub(dx, scale(dot(dn, x) + dot(n, dx), n)), scale(dot(n, x), dn))
+
+
+@compiled
 def combination(s, par, at, step, n, x, first):
     """s + sum_k x[first + k] P_k, k = 0..n - 1, for triples P_k that stand in par from at, `step` numbers apart."""
     for k in range(n):
