@@ -8,16 +8,13 @@ with b = theta_q^T. Springs, dampers and stops say what M is; everything else ab
 from __future__ import annotations
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.angle import add_angle_hessian, add_angle_rate_gradient, angle_directions
-from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated
+from dms_core.model.geometry.angle import add_angle_hessian, add_angle_rate_gradient, half_angle_gradient
 
 
 @compiled
 def angle_gradient(f, g, h, q):
     """theta_q by the Euler parameters of both bodies: an 8-tuple."""
-    m, _ = angle_directions(0, 7, f, g, h, q)
-    x = k_times(rotated(q, 7, h), m, euler_parameters(q, 0))
-    y = k_times(rotated(q, 0, m), h, euler_parameters(q, 7))
+    x, y = half_angle_gradient(0, 7, f, g, h, q)
     return (
         2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * y[0], 2.0 * y[1], 2.0 * y[2], 2.0 * y[3],
     )  # fmt: skip
