@@ -7,7 +7,10 @@ with b = theta_q^T. Springs, dampers and stops say what M is; everything else ab
 
 from __future__ import annotations
 
+import numpy as np
+
 from dms_core.compiled.jit import compiled
+from dms_core.model.element import Pattern
 from dms_core.model.geometry.angle import add_angle_hessian, add_angle_rate_gradient, half_angle_gradient
 
 
@@ -64,3 +67,10 @@ def put_joint_moment(f, g, h, q, v, M, by_angle, by_rate, level, r, Jq, Jv):
             for j in range(8):
                 Jq[local_parameter(i), local_parameter(j)] += b[i] * (by_angle * b[j] + by_rate * w[j])
                 Jv[local_parameter(i), local_parameter(j)] += by_rate * b[i] * b[j]
+
+
+def joint_moment_pattern(damped: bool) -> Pattern:
+    """Where the derivatives of `put_joint_moment` can be non-zero; `damped`: the moment depends on the angle's rate."""
+    p = np.arange(14) % 7 >= 3
+    full, none = np.outer(p, p), np.zeros((14, 14), bool)
+    return Pattern(full, full if damped else none, none)
