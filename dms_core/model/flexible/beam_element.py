@@ -76,6 +76,25 @@ def sections(x, sign):
 
 
 @compiled
+def stretch_direction(n, sign):
+    """(x, y, near, far): near x and near y are what local coordinate n of the first section changes of m and d.
+
+    Coordinate n of the second section changes them by far x and far y.
+    """
+    if n < 3:
+        return STILL4, AXES[n], -1.0, 1.0
+    return PARAMETERS[n - 3], STILL3, 1.0, sign
+
+
+@compiled
+def turn_direction(n, sign):
+    """(x, y, column, factor): factor x and factor y are what local coordinate `column` changes of p and s, n < 8."""
+    if n < 4:
+        return PARAMETERS[n], STILL4, 3 + n, 1.0
+    return STILL4, PARAMETERS[n - 4], 6 + n, sign
+
+
+@compiled
 def relative_rate(p, s, x, y):
     """Derivative of conj(p) s along x of p and y of s."""
     return sum4(product(conjugate(x), s), product(conjugate(p), y))
@@ -180,15 +199,10 @@ def _stretch_derivatives(par, q, v, N, Jq, Jv):
     d, m, p, s = sections(q, sign)
     dv, mv, pv, sv = sections(v, sign)
     g = strain.stretch(m, d)
-    for n in range(3):
-        by_d, by_m, d_rate, m_rate = _stretch_column(stiffness, m, d, g, N, dv, mv, tau, STILL4, AXES[n])
-        for column, factor in ((n, -1.0), (7 + n, 1.0)):
-            _put(Jq, column, factor, by_d, by_m, scaled4(sign, by_m))
-            if tau > 0.0:
-                _put(Jv, column, factor, d_rate, m_rate, scaled4(sign, m_rate))
-    for n in range(4):
-        by_d, by_m, d_rate, m_rate = _stretch_column(stiffness, m, d, g, N, dv, mv, tau, PARAMETERS[n], STILL3)
-        for column, factor in ((3 + n, 1.0), (10 + n, sign)):
+    for n in range(7):
+        x, y, near, far = stretch_direction(n, sign)
+        by_d, by_m, d_rate, m_rate = _stretch_column(stiffness, m, d, g, N, dv, mv, tau, x, y)
+        for column, factor in ((n, near), (7 + n, far)):
             _put(Jq, column, factor, by_d, by_m, scaled4(sign, by_m))
             if tau > 0.0:
                 _put(Jv, column, factor, d_rate, m_rate, scaled4(sign, m_rate))
@@ -202,15 +216,12 @@ def _turn_derivatives(par, q, v, M, Jq, Jv):
     dv, mv, pv, sv = sections(v, sign)
     c = product(conjugate(p), s)
     factors, c_rate = strain.turn_factors(c), relative_rate(p, s, pv, sv)
-    for n in range(4):
-        for column, factor in ((3 + n, 1.0), (10 + n, sign)):
-            x, y = (PARAMETERS[n], STILL4) if column < 7 else (STILL4, PARAMETERS[n])
-            by_p, by_s, p_rate, s_rate = _turn_column(
-                stiffness, p, s, c, factors, M, pv, sv, c_rate, tau, x, y
-            )  # fmt: skip
-            _put(Jq, column, factor, STILL3, by_p, scaled4(sign, by_s))
-            if tau > 0.0:
-                _put(Jv, column, factor, STILL3, p_rate, scaled4(sign, s_rate))
+    for n in range(8):
+        x, y, column, factor = turn_direction(n, sign)
+        by_p, by_s, p_rate, s_rate = _turn_column(stiffness, p, s, c, factors, M, pv, sv, c_rate, tau, x, y)
+        _put(Jq, column, factor, STILL3, by_p, scaled4(sign, by_s))
+        if tau > 0.0:
+            _put(Jv, column, factor, STILL3, p_rate, scaled4(sign, s_rate))
 
 
 @compiled
