@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.bodies.pose import pose_coordinates
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
 from dms_core.model.flexible.frame_sums import (
     FRAME,
@@ -40,7 +41,7 @@ from dms_core.model.flexible.frame_sums import (
     sym_times,
 )
 from dms_core.model.flexible.modal_data import ModalData
-from dms_core.model.geometry.frames import g_matrix, rotation_matrix
+from dms_core.model.geometry.frames import euler_rates
 from dms_core.model.geometry.quaternions import PARAMETERS, conjugate
 from dms_core.model.geometry.rotations import (
     AXES,
@@ -223,11 +224,8 @@ class FloatingFrame(Body):
 
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Origin [m], Euler parameters [-] and modal coordinates, undeformed at the start."""
-        body_rate = rotation_matrix(self.orientation).T @ np.array(self.angular_velocity)
-        p_rate = 0.5 * g_matrix(self.orientation).T @ body_rate
-        start = zip("xyz", self.position, self.velocity, strict=True)
-        euler = zip(("p0", "p1", "p2", "p3"), self.orientation, p_rate, strict=True)
-        rigid = tuple(Coordinate(n, float(x), float(xd)) for n, x, xd in (*start, *euler))
+        p_rate = euler_rates(self.orientation, self.angular_velocity)
+        rigid = pose_coordinates(self.position, self.orientation, self.velocity, p_rate)
         modal = zip(self.data.modal_mass, self.data.modal_stiffness, strict=True)
         # A mode of mass 1 kg moves by 1 m at eta = 1; its nominal size is a hundredth of that.
         sizes = [(0.01 * (self.mass / m) ** 0.5, (k / m) ** 0.5) for m, k in modal]
