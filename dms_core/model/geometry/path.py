@@ -45,6 +45,12 @@ SHORTEST = 1e-12
 
 
 @compiled
+def behind_path(ip, i, j):
+    """Indices in `ip` and `par` behind the path that begins at i and j."""
+    return i + 1 + 2 * ip[i], j + 1 + 6 * ip[i]
+
+
+@compiled
 def _end(q, o, s):
     """A path point in ground axes [m]."""
     if o < 0:
