@@ -24,7 +24,8 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import ModelError, choices
-from dms_core.model.element import COMPOSITIONS, Constraint, DynamicElement, Pattern, Placement, Sensor
+from dms_core.model.control.reading import sensor_of
+from dms_core.model.element import Constraint, DynamicElement, Pattern, Placement, Sensor
 from dms_core.model.signals import Constant
 
 
@@ -57,36 +58,6 @@ def driven_inputs(system, coordinates: dict[str, int]) -> dict[str, str]:
             found[name] = f"{element.name}.{coordinate}"
             writers[name] = who
     return found
-
-
-def sensor_of(system, component: str) -> tuple[Sensor, int]:
-    """The sensor with a component of that full name, and the component's place.
-
-    Raises:
-        ModelError: there is none, or an equation cannot read it.
-    """
-    names = []
-    for sensor in system.sensors:
-        for k, (part, _) in enumerate(sensor.outputs()):
-            names.append(f"{sensor.name}.{part}" if part else sensor.name)
-            if names[-1] == component:
-                _check_readable(system, sensor, component)
-                return sensor, k
-    raise ModelError(f"sensor component '{component}' does not exist. Declared: {choices(names)}.")
-
-
-def _check_readable(system, sensor: Sensor, component: str) -> None:
-    """Refuse sensors of forces that are solved for together with the equation that would read them."""
-    if sensor.composition != COMPOSITIONS.none:
-        what = "is composed from the forces of other elements"
-    elif sensor.place(system).constraint:
-        what = f"reads a force of the constraint '{sensor.place(system).constraint}'"
-    else:
-        return
-    raise ModelError(
-        f"sensor component '{component}' {what}, which no equation can read. Expected one of positions, rates, "
-        "accelerations, states or inputs; the force of a spring, an elastic rope or a bushing follows from these."
-    )
 
 
 def connected(system, element: Any, placement: Placement, driven: dict[str, str]) -> tuple[Placement, Sensor | None]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dms_core.errors import ModelError, choices
+from dms_core.model.constraints.euler_norm import EulerNorm
 from dms_core.model.element import (
     GROUND,
     Body,
@@ -49,8 +50,6 @@ class System:
         sensors: tuple[Sensor, ...] | list[Sensor] = (),
         inputs: tuple[Input, ...] | list[Input] = (),
     ) -> None:
-        from dms_core.model.constraints.euler_norm import EulerNorm
-
         self.name = name
         self.compositions = self._checked("compositions", compositions, Composition)
         made = {composition.name: composition.parts() for composition in self.compositions}
@@ -99,8 +98,6 @@ class System:
 
     def own(self, section: str) -> tuple[Declaration, ...]:
         """What was declared in a list ("bodies", ...): without unit-norm equations, companions and composed parts."""
-        from dms_core.model.constraints.euler_norm import EulerNorm
-
         hidden = {*self.composed, *self.companions}
         return tuple(e for e in getattr(self, section) if not isinstance(e, EulerNorm) and e.name not in hidden)
 

@@ -26,6 +26,11 @@ def _coupled(element: Constraint) -> Example:
     return Example(pair(constraints=[HINGE, AXLE, SLEEVE, element]), element)
 
 
+def _linear(name: str, terms: list[tuple[str, str, float]]) -> Example:
+    coordinates = tuple(JointTerm(joint=j, coordinate=c, factor=x) for j, c, x in terms)  # type: ignore[arg-type]
+    return _coupled(LinearCoupling(name=name, coordinates=coordinates))
+
+
 def gear() -> Example:
     """Between joints of three bodies: the faster wheel has a turn counter."""
     return _coupled(Gear(name="gear", joint_i="hinge", joint_j="axle", ratio=-2.5))
@@ -44,23 +49,13 @@ def rack() -> Example:
 def differential() -> Example:
     """Three angles and a way of joints that share bodies: two turn counters."""
     terms = [("hinge", "angle", 0.5), ("axle", "angle", -1.5), ("sleeve", "angle", 0.7), ("sleeve", "slide", 3.0)]
-    return _coupled(
-        LinearCoupling(
-            name="differential",
-            coordinates=tuple(JointTerm(joint=j, coordinate=c, factor=x) for j, c, x in terms),  # type: ignore[arg-type]
-        )
-    )
+    return _linear("differential", terms)
 
 
 def ways() -> Example:
     """Of one joint's way and its own angle."""
     terms = [("sleeve", "slide", -2.0), ("sleeve", "angle", 0.1)]
-    return _coupled(
-        LinearCoupling(
-            name="thread",
-            coordinates=tuple(JointTerm(joint=j, coordinate=c, factor=x) for j, c, x in terms),  # type: ignore[arg-type]
-        )
-    )
+    return _linear("thread", terms)
 
 
 def drum_rope() -> Example:

@@ -14,8 +14,9 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.bodies.pose import pose_coordinates
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
-from dms_core.model.geometry.frames import g_matrix, rotation_matrix
+from dms_core.model.geometry.frames import euler_rates, rotation_matrix
 from dms_core.model.geometry.rotations import euler_parameters
 
 
@@ -168,10 +169,7 @@ class RigidBody(Body):
         omega = np.array(self.angular_velocity)
         r = np.array(self.position) + lever
         v = np.array(self.velocity) + np.cross(omega, lever)
-        p_rate = 0.5 * g_matrix(self.orientation).T @ (A.T @ omega)
-        start = zip("xyz", r, v, strict=True)
-        euler = zip(("p0", "p1", "p2", "p3"), self.orientation, p_rate, strict=True)
-        return tuple(Coordinate(n, float(x), float(xd)) for n, x, xd in (*start, *euler))
+        return pose_coordinates(r, self.orientation, v, euler_rates(self.orientation, omega))
 
     def place(self, system) -> Placement:
         """One body, its mass and inertia."""

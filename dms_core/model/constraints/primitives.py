@@ -13,6 +13,7 @@ import numpy as np
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import ConstraintPattern
 from dms_core.model.geometry.rotations import (
+    AXES,
     add_cross_hessian,
     add_gradient,
     add_hessian,
@@ -25,8 +26,6 @@ from dms_core.model.geometry.rotations import (
     rotated_rate,
     sub,
 )
-
-UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @compiled
@@ -46,8 +45,8 @@ def coincidence(k, oi, oj, si, sj, q, v, lam, level, phi, G, W, H):
         add_hessian(H, oi, w, si, 1.0)
         add_hessian(H, oj, w, sj, -1.0)
         for m in range(3):
-            add_row_hessian(W, k + m, oi, v, UNIT[m], si, 1.0)
-            add_row_hessian(W, k + m, oj, v, UNIT[m], sj, -1.0)
+            add_row_hessian(W, k + m, oi, v, AXES[m], si, 1.0)
+            add_row_hessian(W, k + m, oj, v, AXES[m], sj, -1.0)
 
 
 @compiled

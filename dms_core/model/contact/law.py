@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import add, dot, scale, sub
+from dms_core.model.geometry.rotations import across, across_change, add, dot, scale, sub
 
 TERMS = 40
 """Terms of the series of both logarithms where d is below 0.3: what is left out is below 1e-20."""
@@ -66,14 +66,8 @@ def normal_force(stiffness, damping, depth, rate):
 @compiled
 def slip_of(slip_speed, n, w):
     """The part of w across n [m/s], and its regularised size."""
-    slip = sub(w, scale(dot(n, w), n))
+    slip = across(w, n)
     return slip, math.sqrt(dot(slip, slip) + slip_speed * slip_speed)
-
-
-@compiled
-def slip_change(n, w, dn, dw):
-    """Its change for changes of n and w."""
-    return sub(sub(dw, scale(dot(dn, w) + dot(n, dw), n)), scale(dot(n, w), dn))
 
 
 @compiled
@@ -87,7 +81,7 @@ def contact_force(friction, slip_speed, N, n, w):
 def contact_force_change(friction, slip_speed, N, n, w, dN, dn, dw):
     """The change of F for changes of N, n and w."""
     slip, size = slip_of(slip_speed, n, w)
-    d_slip = slip_change(n, w, dn, dw)
+    d_slip = across_change(w, n, dw, dn)
     d_size = dot(slip, d_slip) / size
     direction = sub(n, scale(friction / size, slip))
     d_direction = add(sub(dn, scale(friction / size, d_slip)), scale(friction * d_size / (size * size), slip))

@@ -18,7 +18,19 @@ import math
 from typing import NamedTuple
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import add, bilinear, dot, euler_parameters, point, rotated, scale, sub, vec
+from dms_core.model.geometry.rotations import (
+    across,
+    across_change,
+    add,
+    bilinear,
+    dot,
+    euler_parameters,
+    point,
+    rotated,
+    scale,
+    sub,
+    vec,
+)
 
 PLANE_SPHERE, SPHERES, PLANE_DISC = 0, 1, 2
 """First integer of a contact's table."""
@@ -63,18 +75,12 @@ def touching(shape, par, q):
         return g, n, sub(c, scale(R + 0.5 * g, n))
     n = rotated(q, BODY_I, vec(par, CONTACT.normal))
     if shape == PLANE_DISC:
-        t = _across(n, rotated(q, BODY_J, vec(par, CONTACT.axis)))
+        t = across(n, rotated(q, BODY_J, vec(par, CONTACT.axis)))
         Y = sub(c, scale(R / _size(t), t))
         g = dot(n, sub(Y, P))
         return g, n, sub(Y, scale(g, n))
     h = dot(n, sub(c, P))
     return h - R, n, sub(c, scale(h, n))
-
-
-@compiled
-def _across(n, f):
-    """The part of n across f."""
-    return sub(n, scale(dot(n, f), f))
 
 
 @compiled
@@ -120,8 +126,7 @@ def touch_change(shape, par, q, k):
     if shape == PLANE_DISC:
         b = vec(par, CONTACT.axis)
         f, df = rotated(q, BODY_J, b), turned_by(q, BODY_J, dp_j, b)
-        t, along = _across(n, f), dot(n, f)
-        dt = sub(sub(dn, scale(dot(dn, f) + dot(n, df), f)), scale(along, df))
+        t, dt = across(n, f), across_change(n, f, dn, df)
         size = _size(t)
         d_size = dot(t, dt) / size
         Y = sub(c, scale(R / size, t))

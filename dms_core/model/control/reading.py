@@ -1,11 +1,41 @@
-"""A sensor component that an element reads, outside compiled code."""
+"""A sensor component that an element reads: which sensor it is of, and its reading at rest, outside compiled code."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dms_core.errors import ModelError
-from dms_core.model.element import COMPOSITIONS
+from dms_core.errors import ModelError, choices
+from dms_core.model.element import COMPOSITIONS, Sensor
+
+
+def sensor_of(system, component: str) -> tuple[Sensor, int]:
+    """The sensor with a component of that full name, and the component's place.
+
+    Raises:
+        ModelError: there is none, or an equation cannot read it.
+    """
+    names = []
+    for sensor in system.sensors:
+        for k, (part, _) in enumerate(sensor.outputs()):
+            names.append(f"{sensor.name}.{part}" if part else sensor.name)
+            if names[-1] == component:
+                _check_readable(system, sensor, component)
+                return sensor, k
+    raise ModelError(f"sensor component '{component}' does not exist. Declared: {choices(names)}.")
+
+
+def _check_readable(system, sensor: Sensor, component: str) -> None:
+    """Refuse sensors of forces that are solved for together with the equation that would read them."""
+    if sensor.composition != COMPOSITIONS.none:
+        what = "is composed from the forces of other elements"
+    elif sensor.place(system).constraint:
+        what = f"reads a force of the constraint '{sensor.place(system).constraint}'"
+    else:
+        return
+    raise ModelError(
+        f"sensor component '{component}' {what}, which no equation can read. Expected one of positions, rates, "
+        "accelerations, states or inputs; the force of a spring, an elastic rope or a bushing follows from these."
+    )
 
 
 def read_at_rest(system, component: str, q: np.ndarray, u: np.ndarray) -> float:
@@ -18,19 +48,16 @@ def read_at_rest(system, component: str, q: np.ndarray, u: np.ndarray) -> float:
         u: (value, rate, second derivative) of its inputs, shape (k, 3).
 
     Raises:
-        ModelError: there is no such component.
+        ModelError: there is no such component, or an equation cannot read it.
     """
-    for sensor in system.sensors:
-        parts = [f"{sensor.name}.{part}" if part else sensor.name for part, _ in sensor.outputs()]
-        if component in parts and sensor.composition == COMPOSITIONS.none:
-            place = sensor.place(system)
-            n, m, k = place.size, len(parts), len(place.inputs)
-            rest, y, wide, none = np.zeros(n), np.zeros(m), np.zeros((m, n)), np.zeros((m, 1))
-            ip, par = np.array(place.integers, np.int32), np.array(place.numbers, float)
-            held = np.ascontiguousarray(u[:k]) if k else np.zeros((0, 3))
-            type(sensor).kernel(
-                ip, par, np.ascontiguousarray(q[:n]), rest, rest, np.zeros(1), held, 0, y, wide, wide, wide, none,
-                np.zeros((m, k)),
-            )  # fmt: skip
-            return float(y[parts.index(component)])
-    raise ModelError(f"sensor component '{component}' does not exist.")
+    sensor, part = sensor_of(system, component)
+    place = sensor.place(system)
+    n, m, k = place.size, len(sensor.outputs()), len(place.inputs)
+    rest, y, wide, none = np.zeros(n), np.zeros(m), np.zeros((m, n)), np.zeros((m, 1))
+    ip, par = np.array(place.integers, np.int32), np.array(place.numbers, float)
+    held = np.ascontiguousarray(u[:k]) if k else np.zeros((0, 3))
+    type(sensor).kernel(
+        ip, par, np.ascontiguousarray(q[:n]), rest, rest, np.zeros(1), held, 0, y, wide, wide, wide, none,
+        np.zeros((m, k)),
+    )  # fmt: skip
+    return float(y[part])

@@ -31,7 +31,8 @@ from dms_core.errors import ModelError
 from dms_core.model.element import Force, Pattern, Placement, Vector
 from dms_core.model.flexible.beam_mass import add_beam_mass
 from dms_core.model.flexible.section import BeamSection
-from dms_core.model.geometry.rotations import add, dot, euler_parameters, sub, vec
+from dms_core.model.geometry.quaternions import PARAMETERS, conjugate, inner4, product, scaled4, sum4
+from dms_core.model.geometry.rotations import AXES, add, dot, euler_parameters, sub, vec
 from dms_core.model.places import numbers_at
 
 ASKEW = 0.1
@@ -58,27 +59,13 @@ class BeamNumbers(NamedTuple):
 
 BEAM = BeamNumbers()
 
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-PARAMETERS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 STILL3, STILL4 = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
 
 
 @compiled
 def near_sign(q):
     """-1 where the second section's Euler parameters must change sign to be near the first's, else 1."""
-    return 1.0 if strain.inner4(euler_parameters(q, 0), euler_parameters(q, 7)) >= 0.0 else -1.0
-
-
-@compiled
-def scaled4(factor, p):
-    """factor p for a 4-tuple."""
-    return (factor * p[0], factor * p[1], factor * p[2], factor * p[3])
-
-
-@compiled
-def sum4(p, s):
-    """p + s for 4-tuples."""
-    return (p[0] + s[0], p[1] + s[1], p[2] + s[2], p[3] + s[3])
+    return 1.0 if inner4(euler_parameters(q, 0), euler_parameters(q, 7)) >= 0.0 else -1.0
 
 
 @compiled
@@ -89,9 +76,28 @@ def sections(x, sign):
 
 
 @compiled
+def stretch_direction(n, sign):
+    """(x, y, near, far): near x and near y are what local coordinate n of the first section changes of m and d.
+
+    Coordinate n of the second section changes them by far x and far y.
+    """
+    if n < 3:
+        return STILL4, AXES[n], -1.0, 1.0
+    return PARAMETERS[n - 3], STILL3, 1.0, sign
+
+
+@compiled
+def turn_direction(n, sign):
+    """(x, y, column, factor): factor x and factor y are what local coordinate `column` changes of p and s, n < 8."""
+    if n < 4:
+        return PARAMETERS[n], STILL4, 3 + n, 1.0
+    return STILL4, PARAMETERS[n - 4], 6 + n, sign
+
+
+@compiled
 def relative_rate(p, s, x, y):
     """Derivative of conj(p) s along x of p and y of s."""
-    return sum4(strain.product(strain.conjugate(x), s), strain.product(strain.conjugate(p), y))
+    return sum4(product(conjugate(x), s), product(conjugate(p), y))
 
 
 @compiled
@@ -110,7 +116,7 @@ def beam_forces(par, q, v):
     sign = near_sign(q)
     d, m, p, s = sections(q, sign)
     dv, mv, pv, sv = sections(v, sign)
-    c, tau = strain.product(strain.conjugate(p), s), par[BEAM.damping_time]
+    c, tau = product(conjugate(p), s), par[BEAM.damping_time]
     factors, g = strain.turn_factors(c), strain.stretch(m, d)
     c_rate = relative_rate(p, s, pv, sv)
     return (
@@ -140,9 +146,9 @@ def second_stretch(m, d, g, mv, dv, x, y):
     b = strain.stretch_pull_rate(m, d, g, mv, dv, AXES[1])
     c = strain.stretch_pull_rate(m, d, g, mv, dv, AXES[2])
     return (
-        dot(a[0], y) + strain.inner4(a[1], x),
-        dot(b[0], y) + strain.inner4(b[1], x),
-        dot(c[0], y) + strain.inner4(c[1], x),
+        dot(a[0], y) + inner4(a[1], x),
+        dot(b[0], y) + inner4(b[1], x),
+        dot(c[0], y) + inner4(c[1], x),
     )
 
 
@@ -151,12 +157,12 @@ def second_turn(p, s, c, factors, pv, sv, c_rate, x, y):
     """Second derivative of the turn, along (pv, sv) and (x, y)."""
     cx = relative_rate(p, s, x, y)
     # c is bilinear in p and s.
-    cvx = sum4(strain.product(strain.conjugate(x), sv), strain.product(strain.conjugate(pv), y))
+    cvx = sum4(product(conjugate(x), sv), product(conjugate(pv), y))
     k = strain.turn_rate(c, factors, cvx)
     return (
-        k[0] + strain.inner4(strain.turn_pull_rate(c, factors, c_rate, AXES[0]), cx),
-        k[1] + strain.inner4(strain.turn_pull_rate(c, factors, c_rate, AXES[1]), cx),
-        k[2] + strain.inner4(strain.turn_pull_rate(c, factors, c_rate, AXES[2]), cx),
+        k[0] + inner4(strain.turn_pull_rate(c, factors, c_rate, AXES[0]), cx),
+        k[1] + inner4(strain.turn_pull_rate(c, factors, c_rate, AXES[1]), cx),
+        k[2] + inner4(strain.turn_pull_rate(c, factors, c_rate, AXES[2]), cx),
     )
 
 
@@ -181,9 +187,9 @@ def _turn_column(stiffness, p, s, c, factors, M, pv, sv, c_rate, tau, x, y):
     T = strain.turn_pull(c, factors, M)
     T_rate = sum4(strain.turn_pull(c, factors, change), strain.turn_pull_rate(c, factors, cx, M))
     R = strain.turn_pull(c, factors, elastic(stiffness, STILL3, STILL3, tau, by_x))
-    by_p = sum4(strain.product(y, strain.conjugate(T)), strain.product(s, strain.conjugate(T_rate)))
-    by_s = sum4(strain.product(x, T), strain.product(p, T_rate))
-    return by_p, by_s, strain.product(s, strain.conjugate(R)), strain.product(p, R)
+    by_p = sum4(product(y, conjugate(T)), product(s, conjugate(T_rate)))
+    by_s = sum4(product(x, T), product(p, T_rate))
+    return by_p, by_s, product(s, conjugate(R)), product(p, R)
 
 
 @compiled
@@ -193,15 +199,10 @@ def _stretch_derivatives(par, q, v, N, Jq, Jv):
     d, m, p, s = sections(q, sign)
     dv, mv, pv, sv = sections(v, sign)
     g = strain.stretch(m, d)
-    for n in range(3):
-        by_d, by_m, d_rate, m_rate = _stretch_column(stiffness, m, d, g, N, dv, mv, tau, STILL4, AXES[n])
-        for column, factor in ((n, -1.0), (7 + n, 1.0)):
-            _put(Jq, column, factor, by_d, by_m, scaled4(sign, by_m))
-            if tau > 0.0:
-                _put(Jv, column, factor, d_rate, m_rate, scaled4(sign, m_rate))
-    for n in range(4):
-        by_d, by_m, d_rate, m_rate = _stretch_column(stiffness, m, d, g, N, dv, mv, tau, PARAMETERS[n], STILL3)
-        for column, factor in ((3 + n, 1.0), (10 + n, sign)):
+    for n in range(7):
+        x, y, near, far = stretch_direction(n, sign)
+        by_d, by_m, d_rate, m_rate = _stretch_column(stiffness, m, d, g, N, dv, mv, tau, x, y)
+        for column, factor in ((n, near), (7 + n, far)):
             _put(Jq, column, factor, by_d, by_m, scaled4(sign, by_m))
             if tau > 0.0:
                 _put(Jv, column, factor, d_rate, m_rate, scaled4(sign, m_rate))
@@ -213,17 +214,14 @@ def _turn_derivatives(par, q, v, M, Jq, Jv):
     sign, tau, stiffness = near_sign(q), par[BEAM.damping_time], vec(par, BEAM.turning)
     d, m, p, s = sections(q, sign)
     dv, mv, pv, sv = sections(v, sign)
-    c = strain.product(strain.conjugate(p), s)
+    c = product(conjugate(p), s)
     factors, c_rate = strain.turn_factors(c), relative_rate(p, s, pv, sv)
-    for n in range(4):
-        for column, factor in ((3 + n, 1.0), (10 + n, sign)):
-            x, y = (PARAMETERS[n], STILL4) if column < 7 else (STILL4, PARAMETERS[n])
-            by_p, by_s, p_rate, s_rate = _turn_column(
-                stiffness, p, s, c, factors, M, pv, sv, c_rate, tau, x, y
-            )  # fmt: skip
-            _put(Jq, column, factor, STILL3, by_p, scaled4(sign, by_s))
-            if tau > 0.0:
-                _put(Jv, column, factor, STILL3, p_rate, scaled4(sign, s_rate))
+    for n in range(8):
+        x, y, column, factor = turn_direction(n, sign)
+        by_p, by_s, p_rate, s_rate = _turn_column(stiffness, p, s, c, factors, M, pv, sv, c_rate, tau, x, y)
+        _put(Jq, column, factor, STILL3, by_p, scaled4(sign, by_s))
+        if tau > 0.0:
+            _put(Jv, column, factor, STILL3, p_rate, scaled4(sign, s_rate))
 
 
 @compiled
@@ -232,10 +230,10 @@ def beam_element(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     N, M = beam_forces(par, q, v)
     sign = near_sign(q)
     d, m, p, s = sections(q, sign)
-    c = strain.product(strain.conjugate(p), s)
+    c = product(conjugate(p), s)
     by_d, by_m = strain.stretch_pull(m, d, strain.stretch(m, d), N)
     T = strain.turn_pull(c, strain.turn_factors(c), M)
-    by_p, by_s = sum4(by_m, strain.product(s, strain.conjugate(T))), sum4(by_m, strain.product(p, T))
+    by_p, by_s = sum4(by_m, product(s, conjugate(T))), sum4(by_m, product(p, T))
     for i in range(3):
         r[i] -= by_d[i]
         r[7 + i] += by_d[i]
@@ -331,7 +329,7 @@ class BeamElement(Force):
             q[o + 3 : o + 7] = (1.0, 0.0, 0.0, 0.0) if body is None else body.orientation
         sign = near_sign(q)
         d, m, p, s = sections(q, sign)
-        c = strain.product(strain.conjugate(p), s)
+        c = product(conjugate(p), s)
         g, theta = np.array(strain.stretch(m, d)), np.array(strain.turn(c, strain.turn_factors(c)))
         distance = float(np.linalg.norm(g))
         if self.body_i == self.body_j:

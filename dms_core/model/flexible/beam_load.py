@@ -10,11 +10,8 @@ import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
 from dms_core.model.flexible.beam_element import (
-    AXES,
     BEAM,
-    PARAMETERS,
     STILL3,
-    STILL4,
     BeamElement,
     beam_forces,
     elastic,
@@ -23,7 +20,10 @@ from dms_core.model.flexible.beam_element import (
     second_stretch,
     second_turn,
     sections,
+    stretch_direction,
+    turn_direction,
 )
+from dms_core.model.geometry.quaternions import conjugate, product
 from dms_core.model.geometry.rotations import vec
 
 
@@ -42,11 +42,11 @@ def _force_derivatives(par, q, v, Yq, Yv):
     dv, mv, pv, sv = sections(v, sign)
     g = strain.stretch(m, d)
     for n in range(7):
-        x, y = (STILL4, AXES[n]) if n < 3 else (PARAMETERS[n - 3], STILL3)
+        x, y, near, far = stretch_direction(n, sign)
         by_x = strain.stretch_rate(m, d, g, x, y)
         by_q = elastic(stiffness, by_x, STILL3, tau, second_stretch(m, d, g, mv, dv, x, y))
         by_v = elastic(stiffness, STILL3, STILL3, tau, by_x)
-        for column, factor in ((n, -1.0 if n < 3 else 1.0), (7 + n, 1.0 if n < 3 else sign)):
+        for column, factor in ((n, near), (7 + n, far)):
             _put(Yq, 0, column, factor, by_q)
             _put(Yv, 0, column, factor, by_v)
 
@@ -57,11 +57,10 @@ def _moment_derivatives(par, q, v, Yq, Yv):
     sign, tau, stiffness = near_sign(q), par[BEAM.damping_time], vec(par, BEAM.turning)
     d, m, p, s = sections(q, sign)
     dv, mv, pv, sv = sections(v, sign)
-    c = strain.product(strain.conjugate(p), s)
+    c = product(conjugate(p), s)
     factors, c_rate = strain.turn_factors(c), relative_rate(p, s, pv, sv)
     for n in range(8):
-        x, y = (PARAMETERS[n], STILL4) if n < 4 else (STILL4, PARAMETERS[n - 4])
-        column, factor = (3 + n, 1.0) if n < 4 else (6 + n, sign)
+        x, y, column, factor = turn_direction(n, sign)
         by_x = strain.turn_rate(c, factors, relative_rate(p, s, x, y))
         by_q = elastic(stiffness, by_x, STILL3, tau, second_turn(p, s, c, factors, pv, sv, c_rate, x, y))
         _put(Yq, 3, column, factor, by_q)

@@ -17,15 +17,13 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
+from dms_core.model.bodies.pose import pose_coordinates
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
 from dms_core.model.flexible.frame_sums import (
-    AXES,
     FRAME,
     MODE,
     PAIR,
-    UNITS,
     ZERO,
     combined,
     inertia_by,
@@ -43,8 +41,20 @@ from dms_core.model.flexible.frame_sums import (
     sym_times,
 )
 from dms_core.model.flexible.modal_data import ModalData
-from dms_core.model.geometry.frames import g_matrix, rotation_matrix
-from dms_core.model.geometry.rotations import add, bilinear, cross, dot, euler_parameters, rotated, scale, sub, vec
+from dms_core.model.geometry.frames import euler_rates
+from dms_core.model.geometry.quaternions import PARAMETERS, conjugate
+from dms_core.model.geometry.rotations import (
+    AXES,
+    add,
+    bilinear,
+    cross,
+    dot,
+    euler_parameters,
+    rotated,
+    scale,
+    sub,
+    vec,
+)
 from dms_core.model.places import numbers_at
 
 
@@ -106,13 +116,13 @@ def _put_motion(par, n, q, v, s, dz, dw, da, J, column):
 @compiled
 def _frame_derivatives(par, n, q, v, a, s, f, t, Jq, Jv, Ja):
     """Columns of r, p and their rates."""
-    p, back = euler_parameters(q, 0), strain.conjugate(euler_parameters(q, 0))
+    p, back = euler_parameters(q, 0), conjugate(euler_parameters(q, 0))
     for i in range(3):
         Ja[i, i] += par[FRAME.mass]
         _put_motion(par, n, q, v, s, bilinear(back, back, AXES[i]), ZERO, ZERO, Ja, i)
     for i in range(4):
-        e = UNITS[i]
-        dz = scale(2.0, bilinear(back, strain.conjugate(e), vec(a, 0)))
+        e = PARAMETERS[i]
+        dz = scale(2.0, bilinear(back, conjugate(e), vec(a, 0)))
         dw, da = spin(e, euler_parameters(v, 0)), spin(e, euler_parameters(a, 0))
         _put_motion(par, n, q, v, s, dz, dw, da, Jq, 3 + i)
         g, h = scale(2.0, bilinear(p, e, f)), spin_pull(e, t)
@@ -214,11 +224,8 @@ class FloatingFrame(Body):
 
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Origin [m], Euler parameters [-] and modal coordinates, undeformed at the start."""
-        body_rate = rotation_matrix(self.orientation).T @ np.array(self.angular_velocity)
-        p_rate = 0.5 * g_matrix(self.orientation).T @ body_rate
-        start = zip("xyz", self.position, self.velocity, strict=True)
-        euler = zip(("p0", "p1", "p2", "p3"), self.orientation, p_rate, strict=True)
-        rigid = tuple(Coordinate(n, float(x), float(xd)) for n, x, xd in (*start, *euler))
+        p_rate = euler_rates(self.orientation, self.angular_velocity)
+        rigid = pose_coordinates(self.position, self.orientation, self.velocity, p_rate)
         modal = zip(self.data.modal_mass, self.data.modal_stiffness, strict=True)
         # A mode of mass 1 kg moves by 1 m at eta = 1; its nominal size is a hundredth of that.
         sizes = [(0.01 * (self.mass / m) ** 0.5, (k / m) ** 0.5) for m, k in modal]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import add, bilinear, euler_parameters, scale, vec
+from dms_core.model.geometry.quaternions import conjugate, product
+from dms_core.model.geometry.rotations import add, bilinear, combination, euler_parameters, scale, vec
 
 
 class FrameNumbers(NamedTuple):
@@ -41,8 +41,6 @@ class PairNumbers(NamedTuple):
 
 FRAME, MODE, PAIR = FrameNumbers(), ModeNumbers(), PairNumbers()
 MODE_SIZE, PAIR_SIZE = 15, 9
-UNITS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ZERO = (0.0, 0.0, 0.0)
 
 
@@ -74,14 +72,14 @@ def pair_at(n, a, b):
 @compiled
 def spin(p, x):
     """2 G(p) x."""
-    c = strain.product(strain.conjugate(p), x)
+    c = product(conjugate(p), x)
     return (2.0 * c[1], 2.0 * c[2], 2.0 * c[3])
 
 
 @compiled
 def spin_pull(p, t):
     """2 G(p)^T t."""
-    c = strain.product(p, (0.0, t[0], t[1], t[2]))
+    c = product(p, (0.0, t[0], t[1], t[2]))
     return (2.0 * c[0], 2.0 * c[1], 2.0 * c[2], 2.0 * c[3])
 
 
@@ -98,37 +96,26 @@ def sym_times(par, at, w):
 @compiled
 def combined(par, n, place, x):
     """Sum over modes of their triple at `place` times x[7 + a]: P or R_0 times rates, or c less c_0."""
-    s = ZERO
-    for a in range(n):
-        s = add(s, scale(x[7 + a], vec(par, mode_at(a) + place)))
-    return s
+    return combination(ZERO, par, mode_at(0) + place, MODE_SIZE, n, x, 7)
 
 
 @compiled
 def rotation_of(par, n, a, q):
     """R_a at eta."""
-    s = vec(par, mode_at(a) + MODE.rotation)
-    for b in range(n):
-        s = add(s, scale(q[7 + b], vec(par, pair_at(n, b, a) + PAIR.rotation)))
-    return s
+    R_0 = vec(par, mode_at(a) + MODE.rotation)
+    return combination(R_0, par, pair_at(n, 0, a) + PAIR.rotation, PAIR_SIZE * n, n, q, 7)
 
 
 @compiled
 def rotation_rate(par, n, a, x):
     """Sum over b of x[7 + b] R1_b of mode a: Rdot_a for the rates."""
-    s = ZERO
-    for b in range(n):
-        s = add(s, scale(x[7 + b], vec(par, pair_at(n, b, a) + PAIR.rotation)))
-    return s
+    return combination(ZERO, par, pair_at(n, 0, a) + PAIR.rotation, PAIR_SIZE * n, n, x, 7)
 
 
 @compiled
 def rotation_by(par, n, a, x):
     """Sum over b of R1_a of mode b times x[7 + b]: derivative of R x by eta_a."""
-    s = ZERO
-    for b in range(n):
-        s = add(s, scale(x[7 + b], vec(par, pair_at(n, a, b) + PAIR.rotation)))
-    return s
+    return combination(ZERO, par, pair_at(n, a, 0) + PAIR.rotation, PAIR_SIZE, n, x, 7)
 
 
 @compiled
@@ -173,7 +160,7 @@ def rotations_times(par, n, q, x):
 def motion(par, n, q, v, a):
     """The state as the equations need it."""
     p, r_tt = euler_parameters(q, 0), vec(a, 0)
-    back = strain.conjugate(p)
+    back = conjugate(p)
     omega = spin(p, euler_parameters(v, 0))
     return Motion(
         bilinear(back, back, r_tt), omega, spin(p, euler_parameters(a, 0)),

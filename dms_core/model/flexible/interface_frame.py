@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.bodies.pose import pose_coordinates
 from dms_core.model.element import Body, Coordinate, Pattern, Placement, Quaternion, Vector
 
 
@@ -36,9 +37,7 @@ class InterfaceFrame(Body):
 
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Position [m] and Euler parameters [-]."""
-        start = zip("xyz", self.position, self.velocity, strict=True)
-        euler = zip(("p0", "p1", "p2", "p3"), self.orientation, self.euler_rates, strict=True)
-        return tuple(Coordinate(n, float(x), float(xd)) for n, x, xd in (*start, *euler))
+        return pose_coordinates(self.position, self.orientation, self.velocity, self.euler_rates)
 
     def place(self, system) -> Placement:
         """Its coordinates."""

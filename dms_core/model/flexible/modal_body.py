@@ -14,7 +14,7 @@ from dms_core.model.flexible.floating_frame import FloatingFrame, modes_of
 from dms_core.model.flexible.interface_frame import InterfaceFrame
 from dms_core.model.flexible.modal_data import ModalData, nested
 from dms_core.model.flexible.modal_node import ModalNode
-from dms_core.model.geometry.frames import g_matrix, rotation_matrix
+from dms_core.model.geometry.frames import euler_rates, rotation_matrix
 from dms_core.validation import Checked
 
 
@@ -90,14 +90,13 @@ class ModalBody(Composition):
 
     def _interface(self, interface: Interface, p: np.ndarray) -> InterfaceFrame:
         """The frame at a node of the undeformed body."""
-        A = rotation_matrix(p)
-        lever = A @ np.array(interface.point)
+        lever = rotation_matrix(p) @ np.array(interface.point)
         return InterfaceFrame(
             name=f"{self.name}.{interface.name}",
             position=tuple(np.array(self.position) + lever),
             orientation=tuple(p),
             velocity=tuple(np.array(self.velocity) + np.cross(self.angular_velocity, lever)),
-            euler_rates=tuple(0.5 * g_matrix(p).T @ (A.T @ np.array(self.angular_velocity))),
+            euler_rates=tuple(euler_rates(p, self.angular_velocity)),
         )
 
     @classmethod

@@ -14,22 +14,22 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-import dms_core.model.flexible.strains as strain
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Constraint, ConstraintPattern, Placement, Vector
 from dms_core.model.flexible.floating_frame import FloatingFrame
-from dms_core.model.flexible.frame_sums import AXES, UNITS
+from dms_core.model.geometry.quaternions import PARAMETERS, conjugate, inner4, product
 from dms_core.model.geometry.rotations import (
+    AXES,
     add,
     add_hessian,
     add_row_hessian,
     columns,
+    combination,
     dot,
     euler_parameters,
     point,
     rotated,
     rotated_rate,
-    scale,
     vec,
 )
 
@@ -56,10 +56,7 @@ def shape(par, k, rotation):
 @compiled
 def shapes_times(par, n, rotation, x):
     """Psi or Theta times the modal part of q or v."""
-    s = (0.0, 0.0, 0.0)
-    for k in range(n):
-        s = add(s, scale(x[FIRST + k], shape(par, k, rotation)))
-    return s
+    return combination((0.0, 0.0, 0.0), par, NODE.shapes + 3 * rotation, 6, n, x, FIRST)
 
 
 @compiled
@@ -71,7 +68,7 @@ def vector_part(c):
 @compiled
 def relative(p, o):
     """conj(p) o."""
-    return strain.product(strain.conjugate(p), o)
+    return product(conjugate(p), o)
 
 
 @compiled
@@ -88,8 +85,8 @@ def modal_node(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
         G[i, i] -= 1.0
         for k in range(4):
             G[i, 3 + k] -= by_p[k][i]
-            G[3 + i, 3 + k] += 2.0 * relative(UNITS[k], o)[1 + i] - o[k] * theta[i]
-            G[3 + i, 10 + k] += 2.0 * relative(p, UNITS[k])[1 + i] - p[k] * theta[i]
+            G[3 + i, 3 + k] += 2.0 * relative(PARAMETERS[k], o)[1 + i] - o[k] * theta[i]
+            G[3 + i, 10 + k] += 2.0 * relative(p, PARAMETERS[k])[1 + i] - p[k] * theta[i]
     for k in range(n):
         moved, turned = rotated(q, 0, shape(par, k, 0)), shape(par, k, 1)
         for i in range(3):
@@ -105,11 +102,11 @@ def _rates(par, n, s, theta, q, v, W):
     """(phi_q v)_q."""
     p, o, p_t, o_t = euler_parameters(q, 0), euler_parameters(q, 7), euler_parameters(v, 0), euler_parameters(v, 7)
     theta_t, deforming = shapes_times(par, n, 1, v), columns(q, 0, shapes_times(par, n, 0, v))
-    rate = strain.inner4(p_t, o) + strain.inner4(p, o_t)
+    rate = inner4(p_t, o) + inner4(p, o_t)
     for i in range(3):
         add_row_hessian(W, i, 0, v, AXES[i], s, -1.0)
         for k in range(4):
-            e = UNITS[k]
+            e = PARAMETERS[k]
             W[i, 3 + k] -= deforming[k][i]
             W[3 + i, 3 + k] += 2.0 * relative(e, o_t)[1 + i] - o_t[k] * theta[i] - o[k] * theta_t[i]
             W[3 + i, 10 + k] += 2.0 * relative(p_t, e)[1 + i] - p_t[k] * theta[i] - p[k] * theta_t[i]
@@ -127,7 +124,7 @@ def _curvature(par, n, s, theta, q, force, moment, H):
     add_hessian(H, 0, force, s, -1.0)
     for k in range(4):
         for m in range(4):
-            h = 2.0 * dot(moment, vector_part(relative(UNITS[k], UNITS[m]))) - (along if k == m else 0.0)
+            h = 2.0 * dot(moment, vector_part(relative(PARAMETERS[k], PARAMETERS[m]))) - (along if k == m else 0.0)
             H[3 + k, 10 + m] += h
             H[10 + m, 3 + k] += h
     for k in range(n):

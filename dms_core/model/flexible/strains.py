@@ -17,36 +17,12 @@ derivative applied to a force f; `_pull_rate`, the derivative of that along (x, 
 import math
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import bilinear, cross, dot, k_times
+from dms_core.model.geometry.quaternions import conjugate, inner4
+from dms_core.model.geometry.rotations import bilinear, dot, k_times
 
 NEAR = 0.01
 """Square of the tangent of half the turn below which series replace quotients of small numbers: seven terms are then
 exact to 1e-14, and the quotients above lose four digits of the last derivative at most."""
-
-
-@compiled
-def conjugate(p):
-    """(p0, -e)."""
-    return (p[0], -p[1], -p[2], -p[3])
-
-
-@compiled
-def inner4(p, s):
-    """p . s of two 4-tuples."""
-    return p[0] * s[0] + p[1] * s[1] + p[2] * s[2] + p[3] * s[3]
-
-
-@compiled
-def product(p, s):
-    """Product of two quaternions: A(product(p, s)) = A(p) A(s)."""
-    e, f = (p[1], p[2], p[3]), (s[1], s[2], s[3])
-    c = cross(e, f)
-    return (
-        p[0] * s[0] - dot(e, f),
-        p[0] * f[0] + s[0] * e[0] + c[0],
-        p[0] * f[1] + s[0] * e[1] + c[1],
-        p[0] * f[2] + s[0] * e[2] + c[2],
-    )
 
 
 @compiled

@@ -19,7 +19,7 @@ from pydantic import Field, field_validator, model_validator
 from dms_core.compiled.jit import compiled
 from dms_core.errors import DmsError, ModelError
 from dms_core.model.constraints.joints.relative_pose import joint_arms
-from dms_core.model.constraints.primitives import UNIT, dot2, dot2_second
+from dms_core.model.constraints.primitives import dot2, dot2_second
 from dms_core.model.element import GROUND, Force, Pattern, Placement, Quaternion, Vector
 from dms_core.model.forces.load_curve import LoadCurve, curve_load, stiffness_numbers
 from dms_core.model.geometry.frames import euler_parameters, rotation_matrix
@@ -30,7 +30,7 @@ from dms_core.model.geometry.rotation_vector import (
     rotation_vector,
     short_way,
 )
-from dms_core.model.geometry.rotations import point, rotated, sub, vec
+from dms_core.model.geometry.rotations import AXES, point, rotated, sub, vec
 from dms_core.model.places import numbers_at
 from dms_core.validation import Checked
 
@@ -70,7 +70,7 @@ def _put_deflections(par, q, v, y, G):
     s_i, s_j, ci, cj = vec(par, BUSHING.s_i), vec(par, BUSHING.s_j), _four(par, BUSHING.c_i), _four(par, BUSHING.c_j)
     for k in range(3):
         dot2(k, 0, 7, vec(par, BUSHING.axes + 3 * k), s_i, s_j, q, v, y, 0, y, G, G, G)
-        add_vector_gradient(3 + k, 0, 7, ci, cj, UNIT[k], q, G)
+        add_vector_gradient(3 + k, 0, 7, ci, cj, AXES[k], q, G)
     x, _ = short_way(q, 0, 7, ci, cj)
     phi = rotation_vector(x)
     for k in range(3):
@@ -85,7 +85,7 @@ def _add_second(par, q, v, F, W, H):
     for k in range(3):
         axis = vec(par, BUSHING.axes + 3 * k)
         dot2_second(k, 0, 7, axis, s_i, s_j, q, v, F[k], rotated(q, 0, axis), d, W, H)
-        add_vector_rate_gradient(3 + k, 0, 7, ci, cj, UNIT[k], q, v, W)
+        add_vector_rate_gradient(3 + k, 0, 7, ci, cj, AXES[k], q, v, W)
     add_vector_hessian(0, 7, ci, cj, (F[3], F[4], F[5]), q, H)
 
 

@@ -14,10 +14,8 @@ from pydantic import Field
 from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.forces.mass_moment import add_moment_load, first_moment
-from dms_core.model.geometry.rotations import columns, dot, rotated, vec
-
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+from dms_core.model.forces.mass_moment import add_moment_load, first_moment, moment_pattern
+from dms_core.model.geometry.rotations import AXES, columns, dot, rotated, vec
 
 
 class GravityNumbers(NamedTuple):
@@ -97,10 +95,3 @@ class Gravity(Force):
             numbers=(*weight, *self.acceleration, *map(float, np.ravel(moment))),
             pattern=Pattern(by_q, np.zeros_like(by_q), np.zeros_like(by_q)),
         )  # fmt: skip
-
-
-def moment_pattern(k: int) -> np.ndarray:
-    """Where the derivatives of `add_moment_load` may be non-zero, k further coordinates."""
-    by_q = np.zeros((7 + k, 7 + k), bool)
-    by_q[3:7, 3:] = by_q[3:, 3:7] = True
-    return by_q

@@ -7,17 +7,17 @@ with b = theta_q^T. Springs, dampers and stops say what M is; everything else ab
 
 from __future__ import annotations
 
+import numpy as np
+
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.angle import add_angle_hessian, add_angle_rate_gradient, angle_directions
-from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated
+from dms_core.model.element import Pattern
+from dms_core.model.geometry.angle import add_angle_hessian, add_angle_rate_gradient, half_angle_gradient
 
 
 @compiled
 def angle_gradient(f, g, h, q):
     """theta_q by the Euler parameters of both bodies: an 8-tuple."""
-    m, _ = angle_directions(0, 7, f, g, h, q)
-    x = k_times(rotated(q, 7, h), m, euler_parameters(q, 0))
-    y = k_times(rotated(q, 0, m), h, euler_parameters(q, 7))
+    x, y = half_angle_gradient(0, 7, f, g, h, q)
     return (
         2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * y[0], 2.0 * y[1], 2.0 * y[2], 2.0 * y[3],
     )  # fmt: skip
@@ -67,3 +67,10 @@ def put_joint_moment(f, g, h, q, v, M, by_angle, by_rate, level, r, Jq, Jv):
             for j in range(8):
                 Jq[local_parameter(i), local_parameter(j)] += b[i] * (by_angle * b[j] + by_rate * w[j])
                 Jv[local_parameter(i), local_parameter(j)] += by_rate * b[i] * b[j]
+
+
+def joint_moment_pattern(damped: bool) -> Pattern:
+    """Where the derivatives of `put_joint_moment` can be non-zero; `damped`: the moment depends on the angle's rate."""
+    p = np.arange(14) % 7 >= 3
+    full, none = np.outer(p, p), np.zeros((14, 14), bool)
+    return Pattern(full, full if damped else none, none)

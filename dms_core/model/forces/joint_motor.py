@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.joints.axis_joint import AxisJoint
-from dms_core.model.element import Force, Pattern, Placement
-from dms_core.model.forces.joint_moment import angle_gradient, local_parameter, put_joint_moment
+from dms_core.model.element import Force, Placement
+from dms_core.model.forces.joint_moment import angle_gradient, joint_moment_pattern, local_parameter, put_joint_moment
 from dms_core.model.geometry.angle import ANGLE, start_frame
 from dms_core.model.geometry.rotations import vec
 
@@ -49,11 +48,9 @@ class JointMotor(Force):
     def place(self, system) -> Placement:
         """Both bodies of the joint and the angle's frame."""
         joint = system.element(self.joint, AxisJoint)
-        p = np.arange(14) % 7 >= 3
-        none = np.zeros((14, 14), bool)
         return Placement(
             bodies=(joint.body_i, joint.body_j),
             inputs=(self.input,),
             numbers=tuple(map(float, start_frame(system, joint))),
-            pattern=Pattern(np.outer(p, p), none, none),
+            pattern=joint_moment_pattern(damped=False),
         )

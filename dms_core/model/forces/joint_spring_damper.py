@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from typing import ClassVar, NamedTuple
 
-import numpy as np
 from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.joints.axis_joint import AxisJoint
-from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.forces.joint_moment import put_joint_moment
+from dms_core.model.element import Force, Placement, Vector
+from dms_core.model.forces.joint_moment import joint_moment_pattern, put_joint_moment
 from dms_core.model.geometry.angle import angle_frame, angle_rate, joint_angle
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.places import numbers_at
@@ -67,8 +66,6 @@ class JointSpringDamper(Force):
         joint = system.element(self.joint, AxisJoint)
         who = f"joint_spring_damper '{self.name}'"
         frame = angle_frame(system, who, joint, self.pointer_i, self.pointer_j)
-        p = np.arange(14) % 7 >= 3
-        full, none = np.outer(p, p), np.zeros((14, 14), bool)
         return Placement(
             bodies=(joint.body_i, joint.body_j),
             numbers=numbers_at(
@@ -80,5 +77,5 @@ class JointSpringDamper(Force):
                 damping=self.damping,
                 rest_angle=self.rest_angle,
             ),  # fmt: skip
-            pattern=Pattern(full, full if self.damping > 0.0 else none, none),
+            pattern=joint_moment_pattern(self.damping > 0.0),
         )

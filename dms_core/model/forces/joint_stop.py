@@ -20,13 +20,13 @@ from __future__ import annotations
 import math
 from typing import ClassVar, NamedTuple, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.joints.axis_joint import AxisJoint
-from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.forces.joint_moment import put_joint_moment
+from dms_core.model.contact.law import normal_force
+from dms_core.model.element import Force, Placement, Vector
+from dms_core.model.forces.joint_moment import joint_moment_pattern, put_joint_moment
 from dms_core.model.geometry.angle import angle_frame, angle_rate, joint_angle
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.places import numbers_at
@@ -61,13 +61,9 @@ def joint_stop(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     depth, way = abs(off) - 0.5 * (high - low), math.copysign(1.0, off)
     if depth > 0.0:
         k, damping = par[JOINT_STOP.stiffness], 1.5 * par[JOINT_STOP.dissipation]
-        grip = 1.0 + damping * way * angle_rate(0, 7, f, g, h, q, v)
-        if grip > 0.0:
-            root = k * math.sqrt(depth)
-            elastic = root * depth
-            put_joint_moment(
-                f, g, h, q, v, way * elastic * grip, 1.5 * root * grip, elastic * damping, level, r, Jq, Jv
-            )
+        M, by_depth, by_rate = normal_force(k, damping, depth, way * angle_rate(0, 7, f, g, h, q, v))
+        if M > 0.0:
+            put_joint_moment(f, g, h, q, v, way * M, by_depth, by_rate, level, r, Jq, Jv)
 
 
 class JointStop(Force):
@@ -98,8 +94,6 @@ class JointStop(Force):
         """Both bodies of the joint and the angle's frame."""
         joint = system.element(self.joint, AxisJoint)
         frame = angle_frame(system, f"joint_stop '{self.name}'", joint, self.pointer_i, self.pointer_j)
-        p = np.arange(14) % 7 >= 3
-        full, none = np.outer(p, p), np.zeros((14, 14), bool)
         return Placement(
             bodies=(joint.body_i, joint.body_j),
             numbers=numbers_at(
@@ -112,5 +106,5 @@ class JointStop(Force):
                 stiffness=self.stiffness,
                 dissipation=self.dissipation,
             ),  # fmt: skip
-            pattern=Pattern(full, full if self.dissipation > 0.0 else none, none),
+            pattern=joint_moment_pattern(self.dissipation > 0.0),
         )

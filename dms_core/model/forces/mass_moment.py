@@ -8,18 +8,16 @@ g per mass in ground axes does the work g . (m r + A c), so that, besides m g on
 A load that turns with the body has g = A g_b. The numbers are c_0, then the columns of P.
 """
 
+import numpy as np
+
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import add_hessian, columns, dot, rotated, vec
+from dms_core.model.geometry.rotations import add_hessian, columns, combination, dot, rotated, vec
 
 
 @compiled
 def first_moment(par, at, k, q):
     """c(eta) in body axes; numbers from `at`, k further coordinates."""
-    c = vec(par, at)
-    for n in range(k):
-        P, eta = vec(par, at + 3 + 3 * n), q[7 + n]
-        c = (c[0] + eta * P[0], c[1] + eta * P[1], c[2] + eta * P[2])
-    return c
+    return combination(vec(par, at), par, at + 3, 3, k, q, 7)
 
 
 @compiled
@@ -50,3 +48,10 @@ def add_following(par, at, k, g_b, q, Jq):
             Jq[3 + n, 3 + i] -= dot(d[n], turning[i])
         for n in range(k):
             Jq[7 + n, 3 + i] -= dot(rotated(q, 0, vec(par, at + 3 + 3 * n)), turning[i])
+
+
+def moment_pattern(k: int) -> np.ndarray:
+    """Where the derivatives of `add_moment_load` may be non-zero, k further coordinates."""
+    by_q = np.zeros((7 + k, 7 + k), bool)
+    by_q[3:7, 3:] = by_q[3:, 3:7] = True
+    return by_q

@@ -16,16 +16,10 @@ from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.joints.axis_joint import AxisJoint
-from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
+from dms_core.model.element import Pattern, Placement, Vector
 from dms_core.model.forces.joint_moment import put_joint_moment
 from dms_core.model.forces.load_curve import LoadCurve, curve_load, stiffness_numbers
-from dms_core.model.forces.turn_counter import (
-    add_turn_row,
-    counted_angle,
-    counter_pattern,
-    start_of_counter,
-    whole_turns,
-)
+from dms_core.model.forces.turn_counter import CountsTurns, add_turn_row, counter_pattern, whole_turns
 from dms_core.model.geometry.angle import angle_frame, angle_rate, joint_angle, start_angle, start_frame
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.places import numbers_at
@@ -60,7 +54,7 @@ def torsion_spring(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     add_turn_row(14, f, g, h, q, v, level, r, Jq, Jv)
 
 
-class TorsionSpring(Force):
+class TorsionSpring(CountsTurns):
     """Torsion spring that may be wound by many turns, with a stiffness or a curve, and a damper.
 
     The angle is that of the joint where the declared start is, and counts whole turns from there. '<name>.angle' is the
@@ -69,7 +63,6 @@ class TorsionSpring(Force):
 
     kind: ClassVar[str] = "torsion_spring"
     kernel: ClassVar = torsion_spring
-    joint: str = Field(description="joint about an axis")
     stiffness: float | None = Field(default=None, gt=0.0, description="k [N m/rad]; or give a curve")
     curve: LoadCurve | None = Field(default=None, description="moment [N m] against the twist theta - theta0 [rad]")
     damping: float = Field(default=0.0, ge=0.0, description="c [N m s/rad]")
@@ -85,23 +78,6 @@ class TorsionSpring(Force):
             given = "neither a stiffness nor a curve" if self.curve is None else "both a stiffness and a curve"
             raise ValueError(f"{given}; expected one of them")
         return self
-
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        """The angle since the start, with its turns."""
-        return (counted_angle(),)
-
-    def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
-        """The angle since the declared start at the assembled one.
-
-        Args:
-            system: the declared system.
-            q: local coordinates of the placement at the assembled start, shape (15,).
-            u: no inputs, shape (0, 3).
-
-        Returns:
-            One pair (q, v) [rad, rad/s].
-        """
-        return start_of_counter(start_frame(system, system.element(self.joint, AxisJoint)), q)
 
     def place(self, system) -> Placement:
         """Both bodies of the joint, and the own coordinate."""

@@ -73,11 +73,6 @@ def turn_counter(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     add_turn_row(14, vec(par, TURN.f), vec(par, TURN.g), vec(par, TURN.h), q, v, level, r, Jq, Jv)
 
 
-def counted_angle() -> Coordinate:
-    """The state of a counter: 0 at the declared start."""
-    return Coordinate("angle", 0.0, rate_scale=NOMINAL_RATE, differential_rate=False)
-
-
 def counter_pattern() -> np.ndarray:
     """Where derivatives of the counter's row can be non-zero, shape (15, 15)."""
     pattern = np.zeros((15, 15), bool)
@@ -85,27 +80,17 @@ def counter_pattern() -> np.ndarray:
     return pattern
 
 
-def start_of_counter(frame: np.ndarray, q: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """(value, rate) of the counter's state at the assembled start; the row itself fixes the rate."""
-    return ((float(joint_angle(0, 7, tuple(frame[:3]), tuple(frame[3:6]), tuple(frame[6:]), q)), 0.0),)
+class CountsTurns(Force):
+    """Base of what counts the turns of a joint since the declared start, in the coordinate '<name>.angle' [rad]."""
 
-
-class TurnCounter(Force):
-    """The turn of a joint since the declared start, whole turns included; its coordinate is '<name>.angle' [rad].
-
-    It exerts nothing. Couplings of several angles bring their own.
-    """
-
-    kind: ClassVar[str] = "turn_counter"
-    kernel: ClassVar = turn_counter
     joint: str = Field(description="joint about an axis")
 
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """The angle; its rate is fixed by the row itself."""
-        return (counted_angle(),)
+        """The angle, 0 at the declared start; its rate is fixed by the row itself."""
+        return (Coordinate("angle", 0.0, rate_scale=NOMINAL_RATE, differential_rate=False),)
 
     def start_states(self, system, q: np.ndarray, u: np.ndarray) -> tuple[tuple[float, float], ...]:
-        """The angle at the assembled start.
+        """The angle since the declared start at the assembled one.
 
         Args:
             system: the declared system.
@@ -115,7 +100,18 @@ class TurnCounter(Force):
         Returns:
             One pair (q, v) [rad, rad/s].
         """
-        return start_of_counter(start_frame(system, system.element(self.joint, AxisJoint)), q)
+        frame = start_frame(system, system.element(self.joint, AxisJoint))
+        return ((float(joint_angle(0, 7, tuple(frame[:3]), tuple(frame[3:6]), tuple(frame[6:]), q)), 0.0),)
+
+
+class TurnCounter(CountsTurns):
+    """The turn of a joint since the declared start, whole turns included; its coordinate is '<name>.angle' [rad].
+
+    It exerts nothing. Couplings of several angles bring their own.
+    """
+
+    kind: ClassVar[str] = "turn_counter"
+    kernel: ClassVar = turn_counter
 
     def place(self, system) -> Placement:
         """Both bodies of the joint, and the own coordinate."""

@@ -73,10 +73,16 @@ def _gradient(oi, oj, m, h, q):
 
 
 @compiled
+def half_angle_gradient(oi, oj, f, g, h, q):
+    """theta_q / 2 by the Euler parameters of both bodies: two 4-tuples."""
+    m, _ = angle_directions(oi, oj, f, g, h, q)
+    return _gradient(oi, oj, m, h, q)
+
+
+@compiled
 def angle_rate(oi, oj, f, g, h, q, v):
     """theta_q v [rad/s]."""
-    m, _ = angle_directions(oi, oj, f, g, h, q)
-    gi, gj = _gradient(oi, oj, m, h, q)
+    gi, gj = half_angle_gradient(oi, oj, f, g, h, q)
     rate = 0.0
     for k in range(4):
         rate += 2.0 * (gi[k] * v[oi + 3 + k] + gj[k] * v[oj + 3 + k])
@@ -86,8 +92,7 @@ def angle_rate(oi, oj, f, g, h, q, v):
 @compiled
 def add_angle_gradient(k, oi, oj, f, g, h, q, factor, G):
     """G[k, :] += factor theta_q."""
-    m, _ = angle_directions(oi, oj, f, g, h, q)
-    gi, gj = _gradient(oi, oj, m, h, q)
+    gi, gj = half_angle_gradient(oi, oj, f, g, h, q)
     for n in range(4):
         G[k, oi + 3 + n] += 2.0 * factor * gi[n]
         G[k, oj + 3 + n] += 2.0 * factor * gj[n]

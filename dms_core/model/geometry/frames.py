@@ -65,6 +65,11 @@ def quaternion_product(p, s) -> np.ndarray:
     return np.concatenate([[p0 * s0 - e @ f], p0 * f + s0 * e + np.cross(e, f)])
 
 
+def euler_rates(p, angular_velocity) -> np.ndarray:
+    """Rates of unit Euler parameters p [1/s], shape (4,), for an angular velocity in ground axes [rad/s]."""
+    return 0.5 * g_matrix(p).T @ (rotation_matrix(p).T @ np.asarray(angular_velocity, float))
+
+
 def g_matrix(p) -> np.ndarray:
     """G(p), shape (3, 4): omega in body axes = 2 G(p) pdot, and pdot = G(p)^T omega / 2."""
     p0, e1, e2, e3 = p

@@ -26,6 +26,7 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import DmsError, ModelError
 from dms_core.model.element import GROUND, Vector
 from dms_core.model.geometry.rotations import (
+    across,
     add_hessian,
     columns,
     dot,
@@ -41,6 +42,12 @@ from dms_core.validation import Checked
 
 SHORTEST = 1e-12
 """Length [m] below which a segment has no direction; keeps the kernels finite where two points meet."""
+
+
+@compiled
+def behind_path(ip, i, j):
+    """Indices in `ip` and `par` behind the path that begins at i and j."""
+    return i + 1 + 2 * ip[i], j + 1 + 6 * ip[i]
 
 
 @compiled
@@ -118,7 +125,7 @@ def add_path_rate_gradient(ip, i, par, j, q, v, factor, x):
     for k in range(ip[i]):
         oa, ob, sa, sb, w, length = _segment(ip, i, par, j, k, q)
         d_t = sub(_end_rate(q, v, ob, sb), _end_rate(q, v, oa, sa))
-        w_t = scale(1.0 / length, sub(d_t, scale(dot(w, d_t), w)))
+        w_t = scale(1.0 / length, across(d_t, w))
         _add_point_gradient(q, ob, w_t, sb, factor, x)
         _add_point_gradient(q, oa, w_t, sa, -factor, x)
         _add_turning(v, ob, w, sb, factor, x)
@@ -162,8 +169,7 @@ def _add_block(H, q, oi, si, oj, sj, w, c):
         H[oi + n, oj + n] += c
     for n in range(4):
         y, x = cj[n], ci[n]
-        y = scale(c, sub(y, scale(dot(w, y), w)))
-        x = scale(c, sub(x, scale(dot(w, x), w)))
+        y, x = scale(c, across(y, w)), scale(c, across(x, w))
         for m in range(3):
             H[oi + m, oj + 3 + n] += y[m]
             H[oi + 3 + n, oj + m] += x[m]

@@ -16,39 +16,19 @@ with series in s / c^2 where the rotation is small. Rotations as in J. Argyris (
 import math
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.geometry.rotations import cross, dot, euler_parameters
+from dms_core.model.geometry.quaternions import PARAMETERS, conjugate, inner4, product, scaled4, sum4
+from dms_core.model.geometry.rotations import dot, euler_parameters
 
 SMALL = 0.05
 """s / c^2 below which series are summed. Above, g_ss has lost 1e-16 / SMALL^2 = 4e-14 of itself."""
 TERMS = 14
 """Of the series: what is left out is SMALL^14 = 6e-19 of the first."""
-UNITS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-
-
-@compiled
-def quaternion_times(p, s):
-    """Product p s of two 4-tuples, scalar first."""
-    e, f = (p[1], p[2], p[3]), (s[1], s[2], s[3])
-    x = cross(e, f)
-    return (
-        p[0] * s[0] - dot(e, f),
-        p[0] * f[0] + s[0] * e[0] + x[0],
-        p[0] * f[1] + s[0] * e[1] + x[1],
-        p[0] * f[2] + s[0] * e[2] + x[2],
-    )
 
 
 @compiled
 def relative_parameters(p, ci, s, cj):
     """conj(p ci) (s cj) for 4-tuples p of body i and s of body j: linear in each."""
-    w = quaternion_times(p, ci)
-    return quaternion_times((w[0], -w[1], -w[2], -w[3]), quaternion_times(s, cj))
-
-
-@compiled
-def _signed(sign, x):
-    """sign x for a 4-tuple."""
-    return (sign * x[0], sign * x[1], sign * x[2], sign * x[3])
+    return product(conjugate(product(p, ci)), product(s, cj))
 
 
 @compiled
@@ -56,7 +36,7 @@ def short_way(q, oi, oj, ci, cj):
     """(x, sign): x with c >= 0, and the sign that makes it so."""
     x = relative_parameters(euler_parameters(q, oi), ci, euler_parameters(q, oj), cj)
     sign = 1.0 if x[0] >= 0.0 else -1.0
-    return _signed(sign, x), sign
+    return scaled4(sign, x), sign
 
 
 @compiled
@@ -117,17 +97,11 @@ def _curvature_along(x, w, d):
 
 
 @compiled
-def _dot4(a, b):
-    """a . b of two 4-tuples."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-
-
-@compiled
 def _column(q, oi, oj, ci, cj, n):
     """dx/dp_n, n = 0..3 of body i, 4..7 of body j, without the sign."""
     if n < 4:
-        return relative_parameters(UNITS[n], ci, euler_parameters(q, oj), cj)
-    return relative_parameters(euler_parameters(q, oi), ci, UNITS[n - 4], cj)
+        return relative_parameters(PARAMETERS[n], ci, euler_parameters(q, oj), cj)
+    return relative_parameters(euler_parameters(q, oi), ci, PARAMETERS[n - 4], cj)
 
 
 @compiled
@@ -140,36 +114,36 @@ def _place(oi, oj, n):
 def add_vector_gradient(k, oi, oj, ci, cj, w, q, G):
     """G[k, :] += (w . phi)_q."""
     x, sign = short_way(q, oi, oj, ci, cj)
-    slope = _signed(sign, _slope_along(x, w))
+    slope = scaled4(sign, _slope_along(x, w))
     for n in range(8):
-        G[k, _place(oi, oj, n)] += _dot4(slope, _column(q, oi, oj, ci, cj, n))
+        G[k, _place(oi, oj, n)] += inner4(slope, _column(q, oi, oj, ci, cj, n))
 
 
 @compiled
 def add_vector_rate_gradient(k, oi, oj, ci, cj, w, q, v, W):
     """W[k, :] += ((w . phi)_q v)_q."""
     x, sign = short_way(q, oi, oj, ci, cj)
-    slope, rate = _signed(sign, _slope_along(x, w)), (0.0, 0.0, 0.0, 0.0)
+    slope, rate = scaled4(sign, _slope_along(x, w)), (0.0, 0.0, 0.0, 0.0)
     for n in range(8):
         d, change = _column(q, oi, oj, ci, cj, n), v[_place(oi, oj, n)]
-        rate = (rate[0] + change * d[0], rate[1] + change * d[1], rate[2] + change * d[2], rate[3] + change * d[3])
+        rate = sum4(rate, scaled4(change, d))
     bend = _curvature_along(x, w, rate)
     for n in range(8):
         at = _place(oi, oj, n)
-        W[k, at] += _dot4(bend, _column(q, oi, oj, ci, cj, n)) + _dot4(slope, _column(v, oi, oj, ci, cj, n))
+        W[k, at] += inner4(bend, _column(q, oi, oj, ci, cj, n)) + inner4(slope, _column(v, oi, oj, ci, cj, n))
 
 
 @compiled
 def add_vector_hessian(oi, oj, ci, cj, w, q, H):
     """H += (w . phi)_qq."""
     x, sign = short_way(q, oi, oj, ci, cj)
-    slope = _signed(sign, _slope_along(x, w))
+    slope = scaled4(sign, _slope_along(x, w))
     for n in range(8):
         bend = _curvature_along(x, w, _column(q, oi, oj, ci, cj, n))
         for m in range(8):
-            H[_place(oi, oj, n), _place(oi, oj, m)] += _dot4(bend, _column(q, oi, oj, ci, cj, m))
+            H[_place(oi, oj, n), _place(oi, oj, m)] += inner4(bend, _column(q, oi, oj, ci, cj, m))
     for n in range(4):
         for m in range(4):
-            cross_term = _dot4(slope, relative_parameters(UNITS[n], ci, UNITS[m], cj))
+            cross_term = inner4(slope, relative_parameters(PARAMETERS[n], ci, PARAMETERS[m], cj))
             H[oi + 3 + n, oj + 3 + m] += cross_term
             H[oj + 3 + m, oi + 3 + n] += cross_term

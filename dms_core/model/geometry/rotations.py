@@ -15,6 +15,9 @@ Tuples live in registers: nothing here allocates.
 
 from dms_core.compiled.jit import compiled
 
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""Unit vectors along x, y and z."""
+
 
 @compiled
 def vec(x, k):
@@ -50,6 +53,26 @@ def dot(a, b):
 def cross(a, b):
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@compiled
+def across(x, n):
+    """The part of x across a unit triple n: x - (n . x) n."""
+    return sub(x, scale(dot(n, x), n))
+
+
+@compiled
+def across_change(x, n, dx, dn):
+    """Its change for changes of x and n."""
+    return sub(sub(dx, scale(dot(dn, x) + dot(n, dx), n)), scale(dot(n, x), dn))
+
+
+@compiled
+def combination(s, par, at, step, n, x, first):
+    """s + sum_k x[first + k] P_k, k = 0..n - 1, for triples P_k that stand in par from at, `step` numbers apart."""
+    for k in range(n):
+        s = add(s, scale(x[first + k], vec(par, at + step * k)))
+    return s
 
 
 @compiled

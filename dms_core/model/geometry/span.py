@@ -15,6 +15,7 @@ import math
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import (
+    across,
     add,
     add_hessian,
     columns,
@@ -24,7 +25,6 @@ from dms_core.model.geometry.rotations import (
     rotated,
     rotated_rate,
     scale,
-    sub,
     vec,
 )
 
@@ -78,7 +78,7 @@ def add_span_rate_gradient(ip, i, par, j, q, v, factor, into):
     for k in range(ip[i]):
         o, t, n, s = _part(ip, i, par, j, k)
         d_t = add(d_t, scale(n, add(scale(t, vec(v, o)), rotated_rate(q, v, o, s))))
-    w_t = scale(1.0 / length, sub(d_t, scale(dot(w, d_t), w)))
+    w_t = scale(1.0 / length, across(d_t, w))
     _add_parts(ip, i, par, j, w_t, q, factor, True, into)
     _add_parts(ip, i, par, j, w, v, factor, False, into)
 
@@ -100,7 +100,7 @@ def add_span_hessian(ip, i, par, j, q, factor, H):
         add_hessian(H, o, w, s, factor * n)
         for m in range(7):
             x = _column(q, o, t, n, s, m)
-            x = scale(factor / length, sub(x, scale(dot(w, x), w)))
+            x = scale(factor / length, across(x, w))
             for k2 in range(ip[i]):
                 o2, t2, n2, s2 = _part(ip, i, par, j, k2)
                 for m2 in range(7):

@@ -18,6 +18,7 @@ from dms_core.model.geometry.path import (
     add_path_gradient,
     add_path_hessian,
     add_path_rate_gradient,
+    behind_path,
     moving_path,
     path_length,
     path_rate,
@@ -34,7 +35,7 @@ behind the path E A and C."""
 @compiled
 def elastic_tension(ip, par, q, v):
     """(tau, derivative by l, by the rate)."""
-    behind = PATH_NUMBERS + 1 + 6 * ip[PATH_INTEGERS]
+    _, behind = behind_path(ip, PATH_INTEGERS, PATH_NUMBERS)
     length, rate = path_length(ip, PATH_INTEGERS, par, PATH_NUMBERS, q), 0.0
     if par[behind + 1] > 0.0:
         rate = path_rate(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, v)

@@ -27,9 +27,9 @@ from dms_core.model.geometry.angle import (
     add_angle_gradient,
     add_angle_hessian,
     add_angle_rate_gradient,
-    angle_directions,
     angle_frame,
     angle_rate,
+    half_angle_gradient,
 )
 from dms_core.model.geometry.path import (
     PathPoint,
@@ -41,7 +41,7 @@ from dms_core.model.geometry.path import (
     path_rate,
     start_length,
 )
-from dms_core.model.geometry.rotations import euler_parameters, k_times, rotated, vec
+from dms_core.model.geometry.rotations import vec
 from dms_core.model.places import numbers_at
 from dms_core.model.ropes.stretch import stretch_tension
 
@@ -86,9 +86,7 @@ def winch(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     (tau, by_length, by_free, by_rate), length, x, winding = winch_tension(ip, par, q, v)
     # s_q = l_q + R theta_q stands in r until the end.
     add_path_gradient(ip, PATH_INTEGERS, par, PATH_NUMBERS, q, 1.0, r)
-    m, _ = angle_directions(oi, oj, f, g, h, q)
-    turn_i = k_times(rotated(q, oj, h), m, euler_parameters(q, oi))
-    turn_j = k_times(rotated(q, oi, m), h, euler_parameters(q, oj))
+    turn_i, turn_j = half_angle_gradient(oi, oj, f, g, h, q)
     for k in range(4):
         r[oi + 3 + k] += 2.0 * R * turn_i[k]
         r[oj + 3 + k] += 2.0 * R * turn_j[k]

@@ -17,10 +17,10 @@ from pydantic import Field
 from dms_core.compiled.jit import compiled
 from dms_core.model.contact.contact import Contact
 from dms_core.model.contact.kernel import damping_of, input_change, relative_velocity, velocity_changes
-from dms_core.model.contact.law import normal_force, slip_change, slip_of
+from dms_core.model.contact.law import normal_force, slip_of
 from dms_core.model.contact.shapes import CONTACT, touch_change, touching
 from dms_core.model.element import Placement, Sensor
-from dms_core.model.geometry.rotations import dot
+from dms_core.model.geometry.rotations import across_change, dot
 
 
 @compiled
@@ -44,10 +44,10 @@ def contact_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
         opening = dot(dn, w) + dot(n, by_q)
         dN = -by_depth * dg - by_rate * opening
         Yq[0, k], Yq[1, k], Yq[2, k] = dg, opening, dN
-        Yq[3, k] = share * dN + by_speed * dot(slip, slip_change(n, w, dn, by_q))
+        Yq[3, k] = share * dN + by_speed * dot(slip, across_change(w, n, by_q, dn))
         opening = dot(n, by_v)
         Yv[1, k], Yv[2, k] = opening, -by_rate * opening
-        Yv[3, k] = -share * by_rate * opening + by_speed * dot(slip, slip_change(n, w, (0.0, 0.0, 0.0), by_v))
+        Yv[3, k] = -share * by_rate * opening + by_speed * dot(slip, across_change(w, n, by_v, (0.0, 0.0, 0.0)))
     if ip[1] > 0:
         Yu[2, 0] = input_change(par, u, -g, -dot(n, w))
         Yu[3, 0] = share * Yu[2, 0]

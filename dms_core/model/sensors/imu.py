@@ -16,11 +16,9 @@ from pydantic import Field
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor, Vector
 from dms_core.model.forces.gravity import Gravity
-from dms_core.model.geometry.rotations import add_gradient, dot, euler_parameters, k_times, rotated, sub, vec
+from dms_core.model.geometry.rotations import AXES, add_gradient, dot, euler_parameters, k_times, rotated, sub, vec
 from dms_core.model.places import numbers_at
 from dms_core.model.sensors.point import point_acceleration
-
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class ImuNumbers(NamedTuple):

@@ -13,7 +13,13 @@ from pydantic import Field, field_validator
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Placement, Sensor
-from dms_core.model.geometry.path import add_path_gradient, add_path_rate_gradient, path_length, path_rate
+from dms_core.model.geometry.path import (
+    add_path_gradient,
+    add_path_rate_gradient,
+    behind_path,
+    path_length,
+    path_rate,
+)
 from dms_core.model.muscles.fibre import held_fibre_state, pennation_cosine, tendon_state
 from dms_core.model.muscles.muscle import PATH_INTEGERS, PATH_NUMBERS, ThelenMuscle, muscle_activation
 
@@ -47,7 +53,7 @@ Component = Literal[
 @compiled
 def muscle_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """Tables of the muscle; behind the integers the number of components and the code of each."""
-    codes = PATH_INTEGERS + 1 + 2 * ip[PATH_INTEGERS]
+    codes, _ = behind_path(ip, PATH_INTEGERS, PATH_NUMBERS)
     for k in range(ip[codes]):
         code = ip[codes + 1 + k]
         if code == LENGTH or code == RATE or code == TENDON_FORCE:

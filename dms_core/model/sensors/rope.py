@@ -21,6 +21,7 @@ from dms_core.model.geometry.path import (
     PathPoint,
     add_path_gradient,
     add_path_rate_gradient,
+    behind_path,
     path_length,
     path_rate,
     path_table,
@@ -45,7 +46,7 @@ LENGTH, RATE = 0, 1
 @compiled
 def rope_sensor(ip, par, q, v, a, lam, u, level, y, Yq, Yv, Ya, Yl, Yu):
     """Tables of rope_force; behind the integers the number of components and the code of each."""
-    codes = PATH_INTEGERS + 1 + 2 * ip[PATH_INTEGERS]
+    codes, _ = behind_path(ip, PATH_INTEGERS, PATH_NUMBERS)
     for k in range(ip[codes]):
         if ip[codes + 1 + k] == LENGTH:
             y[k] = path_length(ip, PATH_INTEGERS, par, PATH_NUMBERS, q)

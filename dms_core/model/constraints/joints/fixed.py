@@ -15,9 +15,9 @@ from pydantic import Field
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.constraints.joints.relative_pose import joint_arms, relative_rotation
-from dms_core.model.constraints.primitives import UNIT, coincidence, dot1, joint_pattern
+from dms_core.model.constraints.primitives import coincidence, dot1, joint_pattern
 from dms_core.model.element import GROUND, Constraint, Placement, Quaternion, Vector
-from dms_core.model.geometry.rotations import vec
+from dms_core.model.geometry.rotations import AXES, vec
 from dms_core.model.places import numbers_at
 
 
@@ -39,7 +39,7 @@ def fixed(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """The equations and their derivatives."""
     coincidence(0, 0, 7, vec(par, WELD.s_i), vec(par, WELD.s_j), q, v, lam, level, phi, G, W, H)
     for k in range(3):
-        dot1(3 + k, 0, 7, UNIT[k], vec(par, WELD.axes + 3 * ((k + 1) % 3)), 0.0, q, v, lam, level, phi, G, W, H)
+        dot1(3 + k, 0, 7, AXES[k], vec(par, WELD.axes + 3 * ((k + 1) % 3)), 0.0, q, v, lam, level, phi, G, W, H)
 
 
 class Fixed(Constraint):

@@ -8,12 +8,16 @@ from dms_core.errors import ModelError
 from dms_core.model.geometry.frames import rotation_matrix
 
 
+def second_point(system, joint) -> np.ndarray:
+    """point_j, by default where point_i starts, in the frame of body_j [m], shape (3,)."""
+    if joint.point_j is None:
+        return system.start_point(joint.body_i, joint.point_i, joint.body_j)
+    return np.asarray(joint.point_j, float)
+
+
 def joint_arms(system, joint) -> tuple[np.ndarray, np.ndarray]:
     """point_i and point_j (by default where point_i starts) from the centres of mass [m], shape (3,) each."""
-    point_j = joint.point_j
-    if point_j is None:
-        point_j = system.start_point(joint.body_i, joint.point_i, joint.body_j)
-    return system.arm(joint.body_i, joint.point_i), system.arm(joint.body_j, point_j)
+    return system.arm(joint.body_i, joint.point_i), system.arm(joint.body_j, second_point(system, joint))
 
 
 def relative_rotation(system, who: str, body_i: str, body_j: str, orientation) -> np.ndarray:

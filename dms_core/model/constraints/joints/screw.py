@@ -16,8 +16,10 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from dms_core.compiled.jit import compiled
-from dms_core.model.constraints.joints.axis_joint import AxisJoint
-from dms_core.model.constraints.primitives import dot1, dot2, joint_pattern
+from dms_core.model.constraints.joints.axis_joint import AXIS, AxisJoint
+from dms_core.model.constraints.joints.cylindrical import cylindrical
+from dms_core.model.constraints.joints.relative_pose import second_point
+from dms_core.model.constraints.primitives import dot2, joint_pattern
 from dms_core.model.element import Placement
 from dms_core.model.geometry.angle import (
     add_angle_gradient,
@@ -33,11 +35,11 @@ from dms_core.model.places import numbers_at
 class ScrewNumbers(NamedTuple):
     """Places of the kernel's numbers: those of a joint about an axis, then those of the thread."""
 
-    s_i: int = 0
-    s_j: int = 3
-    f_i: int = 6
-    g_i: int = 9
-    a_j: int = 12
+    s_i: int = AXIS.s_i
+    s_j: int = AXIS.s_j
+    f_i: int = AXIS.f_i
+    g_i: int = AXIS.g_i
+    a_j: int = AXIS.a_j
     h_j: int = 15
     """Direction of the second body that lies along f_i at the start."""
     start: int = 18
@@ -52,12 +54,9 @@ SCREW = ScrewNumbers()
 @compiled
 def screw(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H):
     """The equations and their derivatives."""
-    s_i, s_j, a = vec(par, SCREW.s_i), vec(par, SCREW.s_j), vec(par, SCREW.a_j)
-    f, g, h, lead = vec(par, SCREW.f_i), vec(par, SCREW.g_i), vec(par, SCREW.h_j), par[SCREW.lead]
-    dot2(0, 0, 7, f, s_i, s_j, q, v, lam, level, phi, G, W, H)
-    dot2(1, 0, 7, g, s_i, s_j, q, v, lam, level, phi, G, W, H)
-    dot1(2, 0, 7, f, a, 0.0, q, v, lam, level, phi, G, W, H)
-    dot1(3, 0, 7, g, a, 0.0, q, v, lam, level, phi, G, W, H)
+    cylindrical(ip, par, q, v, lam, u, level, phi, phi_t, G, W, H)
+    s_i, s_j, lead = vec(par, SCREW.s_i), vec(par, SCREW.s_j), par[SCREW.lead]
+    f, g, h = vec(par, SCREW.f_i), vec(par, SCREW.g_i), vec(par, SCREW.h_j)
     dot2(4, 0, 7, cross(f, g), s_i, s_j, q, v, lam, level, phi, G, W, H)
     per_radian = lead / (2.0 * math.pi)
     error = phi[4] - par[SCREW.start] - per_radian * joint_angle(0, 7, f, g, h, q)
@@ -94,13 +93,7 @@ class Screw(AxisJoint):
         own = self.axis_numbers(system)
         axis, f = np.cross(own["f_i"], own["g_i"]), own["f_i"]
         frame = start_frame(system, self, f)
-        there = system.start_point(self.body_j, self._point_j(system), self.body_i)
+        there = system.start_point(self.body_j, second_point(system, self), self.body_i)
         start = float(axis @ (there - np.asarray(self.point_i)))
         numbers = numbers_at(SCREW, **own, h_j=frame[6:], start=start, lead=self.lead)
         return Placement(bodies=(self.body_i, self.body_j), numbers=numbers, pattern=joint_pattern("22112"))
-
-    def _point_j(self, system) -> np.ndarray:
-        """point_j, or where point_i starts [m]."""
-        if self.point_j is not None:
-            return np.asarray(self.point_j)
-        return system.start_point(self.body_i, self.point_i, self.body_j)
