@@ -209,6 +209,15 @@ def rewind(s, q, v, step):
 
 
 @compiled
+def begin_matrix(s, c0):
+    """Say that the Newton matrix is factorised anew, for this c0 [1/s]: nothing is known of how it contracts."""
+    clock, counts = floats(s, STATE.clock), ints(s, STATE.counts)
+    clock[CLOCK.c0_factored], clock[CLOCK.contraction] = c0, 0.0
+    counts[COUNTS.factorisations] += 1
+    counts[COUNTS.stale] = counts[COUNTS.age] = 0
+
+
+@compiled
 def renumber(s):
     """Say that numbers of the model have changed, such as a mass: the next step begins with their rates and factors."""
     counts = ints(s, STATE.counts)
