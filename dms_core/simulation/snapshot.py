@@ -25,7 +25,7 @@ from dms_core.model.signals import Function
 from dms_core.results import Result
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.radau_state import NOT_USED
-from dms_core.simulation.state import CLOCK, State, with_tables
+from dms_core.simulation.state import CLOCK, State, with_storage
 
 GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")
 """Fields of Work that outlive a kernel call; the others are local arrays, written before they are read."""
@@ -147,7 +147,7 @@ def put_back(snapshot: Snapshot, tables: Packed, old_tables: Packed, world: Pack
         InputError: the snapshot is damaged; names the part. Nothing was written then.
     """
     if tables is not old_tables:
-        world = with_tables(tables.values, world.values)
+        world = with_storage(tables.values, world.values)
     parts = list(_held_parts(world.values))
     _check_sizes(snapshot, parts)
     for (_, array), data in zip(parts, snapshot.arrays, strict=True):
