@@ -32,15 +32,13 @@ GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v"
 
 
 class Orders(NamedTuple):
-    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders, nominal sizes."""
+    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders."""
 
     active: np.ndarray
     newton: NewtonPattern
     newton_lu: LuTables
     rates: RatePattern
     rate_lu: LuTables
-    scale_q: np.ndarray
-    scale_v: np.ndarray
     redundant: int
     c0_ordered: np.ndarray
 

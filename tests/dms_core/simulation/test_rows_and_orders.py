@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dms_core import Simulation, SolverOptions, simulate
+from dms_core import Simulation, SolverOptions, World, simulate
 from dms_core.simulation.state import CLOCK, COUNTS
 from tests.dms_core.cases import model
 from tests.dms_core.mechanisms.study import energy
@@ -47,6 +47,19 @@ def test_a_singular_position_that_is_left_behind_is_forgotten(method):
     simulation.state.counts[COUNTS.stale] = 1
     simulation.advance_once(1.0)
     assert clock[CLOCK.singular_pivot] == 0.0
+
+
+@pytest.mark.parametrize("nearby", [False, True])
+def test_other_orders_keep_the_sizes_that_were_written(nearby):
+    """Sizes are numbers of the model, which an environment writes for each patient; so are tolerances, then."""
+    world = World(model("bennett"))
+    sizes = world.model.tables.values.scale_q, world.model.tables.values.scale_v
+    for factor, size in zip((3.0, 5.0), sizes, strict=True):
+        size *= factor
+    assert world.reorder(nearby=nearby)
+    assert world.tables is not world.model.tables
+    for kept, size in zip((world.tables.values.scale_q, world.tables.values.scale_v), sizes, strict=True):
+        np.testing.assert_array_equal(kept, size)
 
 
 def test_the_motion_does_not_show_where_rows_were_chosen_anew():
