@@ -242,13 +242,20 @@ class Model:
 
     def open_call(self, q: np.ndarray, v: np.ndarray, t: float = 0.0, constraints_only: bool = False) -> Call | None:
         """The first element whose equations, or their derivatives, are not finite at q, v, shape (n_q,); else None."""
-        w = self.new_work()
-        w.q[: self.n_q], w.v[: self.n_q] = q, v
-        packed, dynamics = Packed(w), self._dynamics.values
+        dynamics = self._dynamics.values
         if constraints_only:
             dynamics = dynamics._replace(kernel=dynamics.kernel[:0])
-        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
-        return open_call(self.layout, Packed(dynamics).table, self._constraints.table, packed.table)
+        w = self._work_at(q, v, t)
+        return open_call(self.layout, Packed(dynamics).table, self._constraints.table, w.table)
+
+    def _work_at(self, q: np.ndarray, v: np.ndarray | None, t: float, before: bool = False) -> Packed:
+        """Fresh work arrays at a state with the declared inputs; without v it is at rest."""
+        w = self.new_work()
+        w.q[: self.n_q] = q
+        w.v[: self.n_q] = 0.0 if v is None else v
+        packed = Packed(w)
+        evaluate_inputs(Packed(self._signals).table, t, before, packed.table)
+        return packed
 
     def constraint_jacobian(
         self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: bool = False
@@ -257,26 +264,18 @@ class Model:
 
         `before` takes the inputs from the left of a jump at t.
         """
-        w = self.new_work()
-        w.q[: self.n_q] = q
-        w.v[: self.n_q] = 0.0 if v is None else v
-        packed = Packed(w)
-        evaluate_inputs(Packed(self._signals).table, t, before, packed.table)
+        w = self._work_at(q, v, t, before)
         G, W = np.zeros((self.n_phi, self.n_q + 7)), np.zeros((self.n_phi, self.n_q + 7))
-        dense_constraints(self._constraints.table, packed.table, G, W)
-        return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]
+        dense_constraints(self._constraints.table, w.table, G, W)
+        return w.values.phi, w.values.phi_v, G[:, : self.n_q], W[:, : self.n_q]
 
     def jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[Any, ...]:
         """As `constraint_jacobian`; for more than SPARSE_ROWS rows phi_q is a CSR array, and (phi_q v)_q is None."""
         if self.n_phi <= SPARSE_ROWS:
             return self.constraint_jacobian(q, v, t)
-        w = self.new_work()
-        w.q[: self.n_q] = q
-        w.v[: self.n_q] = 0.0 if v is None else v
-        packed = Packed(w)
-        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
-        G = self._sparse_constraints(w, packed)
-        return w.phi.copy(), w.phi_v.copy(), G, None
+        w = self._work_at(q, v, t)
+        G = self._sparse_constraints(w)
+        return w.values.phi, w.values.phi_v, G, None
 
     @cached_property
     def _sparse_constraints(self) -> SparseConstraints:
