@@ -16,14 +16,14 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
-from dms_core.simulation.events import Crossing, Mark, advance_to_crossing
+from dms_core.simulation.events import Crossing, advance_to_crossing
 from dms_core.simulation.failure import explain
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
 from dms_core.simulation.rates_between import rates_between
 from dms_core.simulation.rescue import HELPED, Place, Rescue
 from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
-from dms_core.simulation.snapshot import Snapshot
+from dms_core.simulation.snapshot import Mark, Snapshot, go_back, mark
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state
 from dms_core.simulation.step_control import OUTCOME
 
@@ -171,11 +171,12 @@ class World(Rescue):
 
     def mark(self) -> Mark:
         """The present, to be put back to with `rewind`."""
-        return Mark(self.time, self.snapshot(), 0)
+        return mark(self._tables, self.state, self.result)
 
     def rewind(self, past: Mark) -> None:
         """Go back to a mark; what was recorded since is forgotten."""
-        self.restore(past.snapshot)
+        self._world = go_back(past, self._tables, self._world)
+        self._tables, self.state, self.result = past.tables, self._world.values, past.result
 
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""
@@ -288,9 +289,8 @@ class Simulation(World):
 
     def rewind(self, past: Mark) -> None:
         """Go back to a mark; what was recorded since is forgotten, and what was recorded before is kept."""
-        rows, settings = self._rows[: past.rows], self._settings
         super().rewind(past)
-        self._rows, self._settings = rows, settings
+        self._rows = self._rows[: past.rows]
 
     def record(self) -> np.ndarray:
         """Steps so far: t, q, v, vdot, lam, mu, a row each."""

@@ -132,6 +132,21 @@ def test_back_to_before_a_reorder(hanging):
     assert _go_on(world, "hand", 0.5) == first
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_rewound_to_a_mark_before_a_reorder(hanging, method):
+    """As `restore`, in the same world; what had been recorded until then stays."""
+    world = Simulation(hanging, SolverOptions(method=method))
+    world.advance(0.2)
+    past, recorded = world.mark(), world.record()
+    first = _go_on(world, "hand", 0.5)
+    assert world.reorder()
+    world.advance(0.6)
+    world.rewind(past)
+    assert world.tables is hanging.tables
+    np.testing.assert_array_equal(world.record(), recorded)
+    assert _go_on(world, "hand", 0.5) == first
+
+
 def test_arrays_stay_where_they_are(hanging):
     """Compiled code that holds the addresses of a world goes on to see it."""
     world = _world(hanging, "sdirk2")
