@@ -25,11 +25,16 @@ from dms_core.model.geometry.rotations import (
 
 
 @compiled
+def moment_of(p, Q0, Q):
+    """E(p) (Q0, Q) / 2: the moment in ground axes of a generalised load on Euler parameters p."""
+    e = (p[1], p[2], p[3])
+    return scale(0.5, add(add(scale(-Q0, e), scale(p[0], Q)), cross(e, Q)))
+
+
+@compiled
 def ground_moment(x, o, Q, k):
     """E(p) Q_p / 2 for the Euler parameters in x[o + 3 : o + 7] and Q_p = Q[k : k + 4]."""
-    p = euler_parameters(x, o)
-    e, y = (p[1], p[2], p[3]), vec(Q, k + 1)
-    return scale(0.5, add(add(scale(-Q[k], e), scale(p[0], y)), cross(e, y)))
+    return moment_of(euler_parameters(x, o), Q[k], vec(Q, k + 1))
 
 
 @compiled
@@ -157,9 +162,8 @@ def joint_moment(dynamics, sensors, e, w, sources):
 @compiled
 def _moment_of_column(J, j, o, q, lever, axis):
     """Moment about the axis of the generalised load J[o : o + 7, j] on the body at offset o."""
-    force, p = (J[o, j], J[o + 1, j], J[o + 2, j]), euler_parameters(q, o)
-    e, y = (p[1], p[2], p[3]), (J[o + 4, j], J[o + 5, j], J[o + 6, j])
-    moment = scale(0.5, add(add(scale(-J[o + 3, j], e), scale(p[0], y)), cross(e, y)))
+    force = (J[o, j], J[o + 1, j], J[o + 2, j])
+    moment = moment_of(euler_parameters(q, o), J[o + 3, j], (J[o + 4, j], J[o + 5, j], J[o + 6, j]))
     return dot(axis, add(cross(lever, force), moment))
 
 
@@ -170,10 +174,8 @@ def _own_partials(w, o, columns, axis, force, row, by_q):
     for i in range(3):
         by_q[row, columns[o + i]] += about[i]
     for i in range(4):
-        e, e0 = (1.0 * (i == 1), 1.0 * (i == 2), 1.0 * (i == 3)), 1.0 * (i == 0)
-        y = vec(r, o + 4)
-        d = add(add(scale(-r[o + 3], e), scale(e0, y)), cross(e, y))
-        by_q[row, columns[o + 3 + i]] -= 0.5 * dot(axis, d)
+        d = (1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2), 1.0 * (i == 3))
+        by_q[row, columns[o + 3 + i]] -= dot(axis, moment_of(d, r[o + 3], vec(r, o + 4)))
 
 
 @compiled

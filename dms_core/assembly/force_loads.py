@@ -1,13 +1,12 @@
 """Loads of force elements on a body, from the rows of their kernels; derivatives follow from the kernels' own."""
 
-from dms_core.assembly.composed_sensors import axis_of, frame_partials, ground_moment
+from dms_core.assembly.composed_sensors import axis_of, frame_partials, ground_moment, moment_of
 from dms_core.assembly.local import evaluate_dynamic, views
 from dms_core.assembly.tables import CALLS, WORK
 from dms_core.compiled.arena import floats, indices, ints, matrix
 from dms_core.compiled.entries import integers_of, numbers_of
 from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import (
-    add,
     bilinear,
     cross,
     dot,
@@ -60,10 +59,8 @@ def force_load(dynamics, sensors, e, w, sources):
 @compiled
 def _put_column(J, j, o, q, arm, row, column, into):
     """into[row : row + 6, column] += load of the generalised force -J[o : o + 7, j], in ground axes."""
-    p = euler_parameters(q, o)
-    e, y = (p[1], p[2], p[3]), (J[o + 4, j], J[o + 5, j], J[o + 6, j])
     force = (-J[o, j], -J[o + 1, j], -J[o + 2, j])
-    moment = scale(-0.5, add(add(scale(-J[o + 3, j], e), scale(p[0], y)), cross(e, y)))
+    moment = moment_of(euler_parameters(q, o), -J[o + 3, j], (-J[o + 4, j], -J[o + 5, j], -J[o + 6, j]))
     moment = sub(moment, cross(arm, force))
     for i in range(3):
         into[row + i, column] += force[i]
@@ -76,8 +73,7 @@ def _put_own_partials(r, o, columns, q, s, row, by_q):
     p, force = euler_parameters(q, o), scale(-1.0, vec(r, o))
     for k in range(4):
         d = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2), 1.0 * (k == 3))
-        e, y = (d[1], d[2], d[3]), vec(r, o + 4)
-        moment = scale(-0.5, add(add(scale(-r[o + 3], e), scale(d[0], y)), cross(e, y)))
+        moment = scale(-1.0, moment_of(d, r[o + 3], vec(r, o + 4)))
         moment = sub(moment, cross(scale(2.0, bilinear(p, d, s)), force))
         for i in range(3):
             by_q[row + 3 + i, columns[o + 3 + k]] += moment[i]

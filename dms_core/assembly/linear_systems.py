@@ -25,11 +25,8 @@ from dms_core.linear.symbolic import LuTables, plan
 TYPICAL_C0 = 1.5e3
 """c0 = 1.5 / h of a millisecond step, at which the elimination order is chosen first."""
 
-NEARBY_STATES, NEARBY = 6, 0.1
-"""Number of states, and their distance from the start in nominal sizes, at which an elimination order is tried."""
-
-JOLT = 100.0
-"""Accelerations over nominal rates [1/s] at which an order is tried for a matrix that was singular within a step."""
+NEARBY = 0.1
+"""Distance of nearby states, at which an elimination order is tried too, in nominal sizes."""
 VANISHING = 1e-3
 """Least size of an entry over those states, relative to one of them, below which it is no pivot."""
 
@@ -77,9 +74,6 @@ class LinearSystem:
             samples: entries at the start, then at nearby states.
             quick: see symbolic.plan.
         """
-        if quick:
-            # Chosen for here and now; where entries vanish later its pivots weaken, and it is chosen anew.
-            samples = samples[:1]
         least = np.min(np.abs(samples), axis=0)
         best, found, problem = -1.0, None, None
         for sample, threshold in product(samples, THRESHOLDS):
@@ -115,6 +109,21 @@ class OrderedSystems(NamedTuple):
     rate_lu: LuTables
 
 
+class Search(NamedTuple):
+    """At how many states near the given one an order of elimination is tried, and how these move."""
+
+    nearby: int
+    jolt: float
+    """Accelerations there, over nominal rates [1/s]: commands saturate at large ones."""
+
+
+FROM_THE_START = Search(6, 0.0)
+HERE_AND_NOW = Search(0, 0.0)
+"""Along the motion, the first order that will do: where entries vanish later pivots weaken, and it is chosen anew."""
+WITHIN_A_STEP = Search(6, 100.0)
+"""For a matrix that was singular within a step though it is not at the state."""
+
+
 class Sampling(NamedTuple):
     """Where the numbers come from on which an order is chosen."""
 
@@ -126,17 +135,13 @@ class Sampling(NamedTuple):
     free: np.ndarray
     solved: np.ndarray
     """Coordinates and independent constraint rows that are solved for."""
+    scale_q: np.ndarray
+    scale_v: np.ndarray
+    """Nominal sizes of q and of v, shape (n_q,)."""
+    search: Search
 
 
-def ordered_systems(
-    where: Sampling,
-    q: np.ndarray,
-    v: np.ndarray,
-    t: float,
-    c0: float = TYPICAL_C0,
-    quick: bool = False,
-    jolt: float = 0.0,
-) -> OrderedSystems:
+def ordered_systems(where: Sampling, q: np.ndarray, v: np.ndarray, t: float, c0: float) -> OrderedSystems:
     """Scatter and elimination orders of both systems, from their values at and near q, v, shape (n_q,), at time t.
 
     The Newton matrix depends on c0 [1/s] too: in a short step masses outweigh dampers and springs, in a long one the
@@ -145,7 +150,7 @@ def ordered_systems(
     Raises:
         ModelError: the equations are singular there; names the unknowns that nothing determines.
     """
-    layout, free, solved = where.layout, where.free, where.solved
+    layout, free, solved, quick = where.layout, where.free, where.solved, where.search.nearby == 0
     work, n_q = new_work(layout), layout.n_q
     work.q[:n_q], work.v[:n_q] = q, v
     dynamics, constraints, w = Packed(where.dynamics), Packed(where.constraints), Packed(work)
@@ -157,35 +162,30 @@ def ordered_systems(
     newton, newton_lu = LinearSystem(
         newton, *slots.coordinates(), [*names, *(f"{r} (lam)" for r in rows), *(f"{r} (mu)" for r in rows)]
     ).best_order(_samples(
-        layout, work, free, len(slots.number),
-        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, c0, x), jolt,
+        where, work, len(slots.number),
+        lambda x: evaluate_newton(dynamics.table, constraints.table, packed.table, w.table, c0, x),
     ), quick)  # fmt: skip
     rates, slots = rate_pattern(layout, free, solved)
     packed_rates = Packed(rates)
     rates, rate_lu = LinearSystem(rates, *slots.coordinates(), [*moving, *rows]).best_order(_samples(
-        layout, work, free, len(slots.number),
-        lambda x: evaluate_rates(dynamics.table, constraints.table, packed_rates.table, w.table, x), jolt,
+        where, work, len(slots.number),
+        lambda x: evaluate_rates(dynamics.table, constraints.table, packed_rates.table, w.table, x),
     ), quick)  # fmt: skip
     return OrderedSystems(newton, newton_lu, rates, rate_lu)
 
 
 def nominal_sizes(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    """Nominal sizes of q and of v, shape (n_q,) each."""
+    """Declared nominal sizes of q and of v, shape (n_q,) each."""
     scales = np.array([(c.scale, c.rate_scale) for c in layout.coordinates])
     return np.ascontiguousarray(scales[:, 0]), np.ascontiguousarray(scales[:, 1])
 
 
-def _samples(
-    layout: Layout, work: Work, free: np.ndarray, size: int, evaluate: Callable[[np.ndarray], None], jolt: float = 0.0
-) -> list[np.ndarray]:
-    """Matrix entries at the state in `work` and at nearby ones, where they are finite.
-
-    Nearby states have accelerations of the size of `jolt` times nominal rates, at which commands saturate.
-    """
-    scale_q, scale_v = nominal_sizes(layout)
+def _samples(where: Sampling, work: Work, size: int, evaluate: Callable[[np.ndarray], None]) -> list[np.ndarray]:
+    """Matrix entries at the state in `work` and at nearby ones, where they are finite."""
+    free, scale_q, scale_v, (nearby, jolt) = where.free, where.scale_q, where.scale_v, where.search
     q, v, rng = work.q.copy(), work.v.copy(), np.random.default_rng(0)
     samples = []
-    for k in range(1 + NEARBY_STATES):
+    for k in range(1 + nearby):
         values = np.zeros(size)
         if k > 0:
             work.q[free] = q[free] + NEARBY * scale_q[free] * rng.normal(size=len(free))

@@ -12,7 +12,16 @@ from dms_core.assembly.blocks import Derivatives
 from dms_core.assembly.elimination import Welds, find_welds, recover
 from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
 from dms_core.assembly.layout import Call, Layout, same_structure
-from dms_core.assembly.linear_systems import JOLT, TYPICAL_C0, Sampling, nominal_sizes, ordered_systems
+from dms_core.assembly.linear_systems import (
+    FROM_THE_START,
+    HERE_AND_NOW,
+    TYPICAL_C0,
+    WITHIN_A_STEP,
+    Sampling,
+    Search,
+    nominal_sizes,
+    ordered_systems,
+)
 from dms_core.assembly.order_code import ORDER_CODE
 from dms_core.assembly.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
@@ -97,7 +106,10 @@ class Model:
         if known:
             self._tables = Packed(self._with_orders_of(known))
         else:
-            self._tables = Packed(self._order(self.welds.solved, self.start.q, self.start.v, 0.0, self._signals))
+            self._tables = Packed(self._order(
+                self.welds.solved, self.start.q, self.start.v, 0.0, self._signals, TYPICAL_C0, FROM_THE_START,
+                nominal_sizes(layout),
+            ))  # fmt: skip
 
     def _rows_of(self, constraint: int) -> range:
         """Rows of a constraint by its number."""
@@ -151,7 +163,7 @@ class Model:
     def reordered(
         self, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0, nearby: bool = False
     ) -> Packed:
-        """Tables with independent rows and elimination orders chosen anew at a state.
+        """Tables with independent rows and elimination orders chosen anew at a state; numbers are the model's own.
 
         Args:
             q: position, shape (n_q,).
@@ -159,7 +171,7 @@ class Model:
             t: time [s].
             signals: inputs.
             c0: leading coefficient of the step [1/s] that the order is for.
-            nearby: look at nearby states too, as for the first order; that takes longer.
+            nearby: look at nearby states too, at which commands saturate; that takes longer.
 
         Raises:
             ModelError: the equations are singular there.
@@ -167,7 +179,8 @@ class Model:
         G = self.jacobian(q, v, t)[2][self._moving_rows][:, self.welds.free]
         # Along the motion rows are closed to a tolerance only, within which those that depend on others seem not to.
         found = self._moving_rows[independent_rows(G, MOVED_TOLERANCE, len(self.welds.solved)).independent]
-        return Packed(self._order(found, q, v, t, signals, c0, not nearby, JOLT if nearby else 0.0))
+        sizes = self._tables.values.scale_q, self._tables.values.scale_v
+        return Packed(self._order(found, q, v, t, signals, c0, WITHIN_A_STEP if nearby else HERE_AND_NOW, sizes))
 
     @cached_property
     def _moving_rows(self) -> np.ndarray:
@@ -189,19 +202,22 @@ class Model:
         return carried
 
     def _order(
-        self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float = TYPICAL_C0,
-        quick: bool = False, jolt: float = 0.0,
+        self, solved: np.ndarray, q: np.ndarray, v: np.ndarray, t: float, signals: Signals, c0: float, search: Search,
+        sizes: tuple[np.ndarray, np.ndarray],
     ) -> Tables:  # fmt: skip
-        """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t."""
+        """Tables with scatter and elimination orders of both linear systems chosen at q, v and the inputs at t.
+
+        `sizes` are the nominal ones of q and v; the tables hold these very arrays.
+        """
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
         dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
         constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
-        where = Sampling(layout, dynamics, constraints, signals, free, solved)
-        systems = ordered_systems(where, q, v, t, c0, quick, jolt)
+        where = Sampling(layout, dynamics, constraints, signals, free, solved, *sizes, search)
+        systems = ordered_systems(where, q, v, t, c0)
         return Tables(
             dynamics, constraints, self._sensors.values, *systems, free, solved, self.second_order,
-            *nominal_sizes(layout), sum(len(c.iu) > 0 for c in layout.constraints),
+            *sizes, sum(len(c.iu) > 0 for c in layout.constraints),
             len(self._moving_rows) - len(solved), np.array([c0]),
         )  # fmt: skip
 
@@ -226,13 +242,20 @@ class Model:
 
     def open_call(self, q: np.ndarray, v: np.ndarray, t: float = 0.0, constraints_only: bool = False) -> Call | None:
         """The first element whose equations, or their derivatives, are not finite at q, v, shape (n_q,); else None."""
-        w = self.new_work()
-        w.q[: self.n_q], w.v[: self.n_q] = q, v
-        packed, dynamics = Packed(w), self._dynamics.values
+        dynamics = self._dynamics.values
         if constraints_only:
             dynamics = dynamics._replace(kernel=dynamics.kernel[:0])
-        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
-        return open_call(self.layout, Packed(dynamics).table, self._constraints.table, packed.table)
+        w = self._work_at(q, v, t)
+        return open_call(self.layout, Packed(dynamics).table, self._constraints.table, w.table)
+
+    def _work_at(self, q: np.ndarray, v: np.ndarray | None, t: float, before: bool = False) -> Packed:
+        """Fresh work arrays at a state with the declared inputs; without v it is at rest."""
+        w = self.new_work()
+        w.q[: self.n_q] = q
+        w.v[: self.n_q] = 0.0 if v is None else v
+        packed = Packed(w)
+        evaluate_inputs(Packed(self._signals).table, t, before, packed.table)
+        return packed
 
     def constraint_jacobian(
         self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: bool = False
@@ -241,26 +264,18 @@ class Model:
 
         `before` takes the inputs from the left of a jump at t.
         """
-        w = self.new_work()
-        w.q[: self.n_q] = q
-        w.v[: self.n_q] = 0.0 if v is None else v
-        packed = Packed(w)
-        evaluate_inputs(Packed(self._signals).table, t, before, packed.table)
+        w = self._work_at(q, v, t, before)
         G, W = np.zeros((self.n_phi, self.n_q + 7)), np.zeros((self.n_phi, self.n_q + 7))
-        dense_constraints(self._constraints.table, packed.table, G, W)
-        return w.phi.copy(), w.phi_v.copy(), G[:, : self.n_q], W[:, : self.n_q]
+        dense_constraints(self._constraints.table, w.table, G, W)
+        return w.values.phi, w.values.phi_v, G[:, : self.n_q], W[:, : self.n_q]
 
     def jacobian(self, q: np.ndarray, v: np.ndarray | None = None, t: float = 0.0) -> tuple[Any, ...]:
         """As `constraint_jacobian`; for more than SPARSE_ROWS rows phi_q is a CSR array, and (phi_q v)_q is None."""
         if self.n_phi <= SPARSE_ROWS:
             return self.constraint_jacobian(q, v, t)
-        w = self.new_work()
-        w.q[: self.n_q] = q
-        w.v[: self.n_q] = 0.0 if v is None else v
-        packed = Packed(w)
-        evaluate_inputs(Packed(self._signals).table, t, False, packed.table)
-        G = self._sparse_constraints(w, packed)
-        return w.phi.copy(), w.phi_v.copy(), G, None
+        w = self._work_at(q, v, t)
+        G = self._sparse_constraints(w)
+        return w.values.phi, w.values.phi_v, G, None
 
     @cached_property
     def _sparse_constraints(self) -> SparseConstraints:

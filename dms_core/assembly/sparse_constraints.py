@@ -7,7 +7,6 @@ import scipy.sparse as sp
 
 from dms_core.assembly.layout import Layout
 from dms_core.assembly.local import evaluate_constraint, put_constraint_values, views
-from dms_core.assembly.tables import Work
 from dms_core.compiled.arena import Packed
 from dms_core.compiled.jit import compiled
 
@@ -41,9 +40,9 @@ class SparseConstraints:
         none = np.zeros(0, int)
         self._rows, self._columns = np.concatenate([none, *rows]), np.concatenate([none, *columns])
 
-    def __call__(self, w: Work, packed: Packed) -> sp.csr_array:
+    def __call__(self, w: Packed) -> sp.csr_array:
         """phi_q at the state in the work arrays, into which phi and phi_q v + phi_t are written, (n_phi, n_q)."""
         values = np.zeros(len(self._rows))
-        constraint_entries(self._constraints.table, packed.table, values)
+        constraint_entries(self._constraints.table, w.table, values)
         G = sp.csr_array((values, (self._rows, self._columns)), shape=self._shape)
         return G[:, : self._shape[1] - 7]

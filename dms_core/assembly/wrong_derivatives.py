@@ -52,6 +52,26 @@ def _contradicts(forward, backward, middle, slope, terms):
 
 
 @compiled
+def _put_slopes(block, rows, m, n, values):
+    """m rows at the present value, and what their derivatives give for the steps, with the sizes of its terms."""
+    for i in range(m):
+        values[0, i] = rows[i]
+        values[3, i] = values[4, i] = 0.0
+        for j in range(n):
+            values[3, i] += block[i, j] * values[6, j]
+            values[4, i] += abs(block[i, j] * values[6, j])
+
+
+@compiled
+def _any_contradicts(m, values):
+    """Whether any of m rows contradicts its slope."""
+    for i in range(m):
+        if _contradicts(values[1, i], values[2, i], values[0, i], values[3, i], values[4, i]):
+            return True
+    return False
+
+
+@compiled
 def first_wrong_dynamic(calls, w, values):
     """First dynamic call whose Jq, Jv or Ja contradicts its rows; -1 if none. `values`: scratch, (7, local size)."""
     x = views(calls, w)
@@ -59,23 +79,16 @@ def first_wrong_dynamic(calls, w, values):
         for which in range(3):
             n = evaluate_dynamic(x, calls, e, w, 1)
             block = matrix(w, WORK.Jq) if which == 0 else (matrix(w, WORK.Jv) if which == 1 else matrix(w, WORK.Ja))
-            for i in range(n):
-                values[0, i] = x.r_l[i]
             _choose_steps(x, e, n, which, values)
-            for i in range(n):
-                values[3, i] = values[4, i] = 0.0
-                for j in range(n):
-                    values[3, i] += block[i, j] * values[6, j]
-                    values[4, i] += abs(block[i, j] * values[6, j])
+            _put_slopes(block, x.r_l, n, n, values)
             for side in range(2):
                 _put(x, e, n, which, values, 1.0 if side == 0 else -1.0)
                 evaluate_dynamic(x, calls, e, w, 0)
                 for i in range(n):
                     values[1 + side, i] = x.r_l[i]
             _put(x, e, n, which, values, 0.0)
-            for i in range(n):
-                if _contradicts(values[1, i], values[2, i], values[0, i], values[3, i], values[4, i]):
-                    return e
+            if _any_contradicts(n, values):
+                return e
     return -1
 
 
@@ -85,23 +98,16 @@ def first_wrong_constraint(calls, w, values):
     x = views(calls, w)
     for e in range(x.kernel.shape[0]):
         n, m = evaluate_constraint(x, calls, e, w, 1), x.row[e + 1] - x.row[e]
-        for i in range(m):
-            values[0, i] = x.phi_l[i]
         _choose_steps(x, e, n, 0, values)
-        for i in range(m):
-            values[3, i] = values[4, i] = 0.0
-            for j in range(n):
-                values[3, i] += x.G[i, j] * values[6, j]
-                values[4, i] += abs(x.G[i, j] * values[6, j])
+        _put_slopes(x.G, x.phi_l, m, n, values)
         for side in range(2):
             _put(x, e, n, 0, values, 1.0 if side == 0 else -1.0)
             evaluate_constraint(x, calls, e, w, 0)
             for i in range(m):
                 values[1 + side, i] = x.phi_l[i]
         _put(x, e, n, 0, values, 0.0)
-        for i in range(m):
-            if _contradicts(values[1, i], values[2, i], values[0, i], values[3, i], values[4, i]):
-                return e
+        if _any_contradicts(m, values):
+            return e
     return -1
 
 

@@ -16,14 +16,14 @@ from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.addresses import part_addresses
-from dms_core.simulation.events import Crossing, Mark, advance_to_crossing
+from dms_core.simulation.events import Crossing, advance_to_crossing
 from dms_core.simulation.failure import explain
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.parts import advance, restart
 from dms_core.simulation.rates_between import rates_between
-from dms_core.simulation.rescue import HELPED, Rescue
+from dms_core.simulation.rescue import HELPED, Place, Rescue
 from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
-from dms_core.simulation.snapshot import Snapshot
+from dms_core.simulation.snapshot import Mark, Snapshot, go_back, mark
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state
 from dms_core.simulation.step_control import OUTCOME
 
@@ -71,7 +71,6 @@ class World(Rescue):
         self.crossed_at = -math.inf
         """When that was [s]."""
         self._singular = self._why = ""
-        self._once = False
 
     @property
     def tables(self) -> Packed:
@@ -136,47 +135,48 @@ class World(Rescue):
         if stop_at:
             self.result, self.crossing = advance_to_crossing(self, t_end, stop_at, progress)
             return self.result
+        return self._solve(t_end, progress)
+
+    def advance_once(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
+        """One step towards t_end [s], or to it; as `advance` otherwise."""
+        return self._solve(t_end, progress, True)
+
+    def _solve(self, t_end: float, progress: Callable[[float], None] | None, once: bool = False) -> Result:
+        """Step until t_end, or `once`, with other rows and orders of elimination where those at hand fail."""
         self.crossing = None
         if not (t_end == 0.0 or is_positive(t_end)) or t_end < self.time:
             raise InputError(f"t_end: Expected a time of at least the present {self.time:.6g} s, got {t_end} s.")
         try:
-            tried: set[tuple[int, float, int]] = set()
-            code = self._advance(float(t_end), progress)
+            tried: set[Place] = set()
+            code = self._advance(float(t_end), progress, once)
             while code in HELPED and self._help(code, tried):
-                code = self._advance(float(t_end), progress)
+                code = self._advance(float(t_end), progress, once)
         except KeyboardInterrupt:
             self.result = Result.INTERRUPTED
             return self.result
         self.result, self._why = explain(self.model, self._tables, self._world, RESULT_OF[code], self._singular)
         return self.result
 
-    def _advance(self, t_end: float, progress: Callable[[float], None] | None) -> int:
-        """Step until t_end, draining the record; gives a code of OUTCOME."""
-        code = OUTCOME.buffer_full
-        while code == OUTCOME.buffer_full:
-            code, count = advance(self._tables.table, self._world.table, self._numbers, t_end, self._buffer, 0)
-            self._keep(self._buffer[:count])
+    def _advance(self, t_end: float, progress: Callable[[float], None] | None, once: bool) -> int:
+        """Step until t_end, or once, draining the record; gives a code of OUTCOME."""
+        # There is room for one step: where it begins, if that is behind a jump, and where it ends.
+        buffer = np.zeros((2, self._buffer.shape[1])) if once else self._buffer
+        while True:
+            code, count = advance(self._tables.table, self._world.table, self._numbers, t_end, buffer, 0)
+            self._keep(buffer[:count])
             if progress is not None:
                 progress(self.time)
-            if self._once:
-                break
-        return code
-
-    def advance_once(self, t_end: float, progress: Callable[[float], None] | None = None) -> Result:
-        """One step towards t_end [s], or to it; as `advance` otherwise."""
-        whole, self._buffer, self._once = self._buffer, np.zeros((2, self._buffer.shape[1])), True
-        try:
-            return self.advance(t_end, progress)
-        finally:
-            self._buffer, self._once = whole, False
+            if once or code != OUTCOME.buffer_full:
+                return code
 
     def mark(self) -> Mark:
         """The present, to be put back to with `rewind`."""
-        return Mark(self.time, self.snapshot(), 0)
+        return mark(self._tables, self.state, self.result)
 
     def rewind(self, past: Mark) -> None:
         """Go back to a mark; what was recorded since is forgotten."""
-        self.restore(past.snapshot)
+        self._world = go_back(past, self._tables, self._world)
+        self._tables, self.state, self.result = past.tables, self._world.values, past.result
 
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""
@@ -289,9 +289,8 @@ class Simulation(World):
 
     def rewind(self, past: Mark) -> None:
         """Go back to a mark; what was recorded since is forgotten, and what was recorded before is kept."""
-        rows, settings = self._rows[: past.rows], self._settings
         super().rewind(past)
-        self._rows, self._settings = rows, settings
+        self._rows = self._rows[: past.rows]
 
     def record(self) -> np.ndarray:
         """Steps so far: t, q, v, vdot, lam, mu, a row each."""

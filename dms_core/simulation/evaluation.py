@@ -12,6 +12,7 @@ from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import floats, inner, ints
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.order_watch import note_pivot
 from dms_core.simulation.parts import SINGULAR_PIVOT
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
@@ -37,14 +38,11 @@ def constraints(m, s):
 
 @compiled
 def newton_matrix(m, s):
-    """Residual, and the factorised Newton matrix for c0 = clock[CLOCK.c0_factored].
-
-    clock[CLOCK.pivot] is its smallest relative pivot.
-    """
+    """Residual, and the factorised Newton matrix for c0 = clock[CLOCK.c0_factored]; its pivot is noted."""
     clock, values, w = floats(s, STATE.clock), floats(s, STATE.newton_values), inner(s, STATE.w)
     dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
     evaluate_newton(dynamics, constraints, inner(m, MODEL.newton), w, clock[CLOCK.c0_factored], values)
-    clock[CLOCK.pivot] = factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work))
+    note_pivot(s, factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work)))
 
 
 @compiled
@@ -56,7 +54,7 @@ def newton_solution(m, s):
 
 @compiled
 def rate_matrix(m, s):
-    """Residual and factorised matrix of the acceleration problem; clock[CLOCK.pivot] as above."""
+    """Residual and factorised matrix of the acceleration problem; clock[CLOCK.pivot] is its smallest relative pivot."""
     values = floats(s, STATE.rate_values)
     dynamics, constraints = inner(m, MODEL.dynamics), inner(m, MODEL.constraints)
     evaluate_rates(dynamics, constraints, inner(m, MODEL.rates), inner(s, STATE.w), values)

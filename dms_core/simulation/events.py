@@ -33,15 +33,6 @@ class Crossing(NamedTuple):
     value: float = 0.0
 
 
-class Mark(NamedTuple):
-    """A place in time that a world can be put back to, with what it had recorded until then."""
-
-    time: float
-    snapshot: Any
-    rows: int
-    """Pieces of the record."""
-
-
 def checked(world: Any, stop_at: Crossing | Sequence[Crossing]) -> list[tuple[int, Crossing]]:
     """The crossings with the places of their components among the sensors.
 

@@ -15,7 +15,7 @@ from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import flags, floats, inner, ints, naturals, number
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.parts import PARTS, run_part
-from dms_core.simulation.state import CLOCK, COUNTS, STATE
+from dms_core.simulation.state import CLOCK, COUNTS, STATE, begin_matrix
 
 MAX_ITERATIONS = 60
 SMALL_CHANGE = 0.02
@@ -167,13 +167,10 @@ def stage_rates(m, s, c0):
     False where it is not, as where a fibre's kink lies between: the rates of a step are as good as its tolerance only.
     With c0 > 0 the derivatives serve the Newton matrix of the next step as well.
     """
-    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
     part = PARTS.rate_matrix
     if c0 > 0.0:
         part = PARTS.both_matrices
-        clock[CLOCK.c0_factored], clock[CLOCK.contraction] = c0, 0.0
-        count[COUNTS.factorisations] += 1
-        count[COUNTS.age] = 0
+        begin_matrix(s, c0)
     _put_state(m, s)
     if not _correct(m, s, part) or not _first_order_change(m, s) < SMALL_CHANGE:
         return False

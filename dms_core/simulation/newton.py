@@ -11,9 +11,9 @@ from typing import NamedTuple
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import fields, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.order_watch import LEFT_BEHIND, nearly_singular
+from dms_core.simulation.order_watch import nearly_singular
 from dms_core.simulation.parts import PARTS, SINGULAR_PIVOT, run_part
-from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, begin_matrix
 
 
 class Newton(NamedTuple):
@@ -97,29 +97,14 @@ def correction_norm(m, s, c0):
 
 
 @compiled
-def refresh(m, s, c0):
-    """Evaluate residual and matrix here and factorise; False if the matrix is singular."""
-    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
-    clock[CLOCK.c0_factored] = c0
-    count[COUNTS.factorisations] += 1
-    count[COUNTS.stale] = 0
-    count[COUNTS.age] = 0
-    clock[CLOCK.contraction] = 0.0
-    run_part(m, s, PARTS.newton_matrix)
-    clock[CLOCK.best_pivot] = max(clock[CLOCK.best_pivot], clock[CLOCK.pivot])
-    if clock[CLOCK.pivot] > LEFT_BEHIND * clock[CLOCK.singular_pivot]:
-        clock[CLOCK.singular_pivot] = 0.0
-    return clock[CLOCK.pivot] > SINGULAR_PIVOT
+def refresh(m, s, c0, part):
+    """Evaluate residual and matrix here and factorise; False if the matrix is singular.
 
-
-@compiled
-def failure(m, s, c0):
-    """Why `refresh` failed: not finite (a smaller step may help) or singular."""
-    right_hand_side(m, s, c0)
-    b, total = floats(s, STATE.b), 0.0
-    for i in range(b.shape[0]):
-        total += abs(b[i])
-    return NEWTON.singular if total < math.inf else NEWTON.not_finite
+    `part` does it: PARTS.newton_matrix, or PARTS.radau_matrices for the two of Radau IIA.
+    """
+    begin_matrix(s, c0)
+    run_part(m, s, part)
+    return floats(s, STATE.clock)[CLOCK.pivot] > SINGULAR_PIVOT
 
 
 @compiled
@@ -143,6 +128,16 @@ def largest_errors(s):
         largest = max(largest, abs(phi[k]))
         largest_v = max(largest_v, abs(phi_v[k]))
     return largest, largest_v
+
+
+@compiled
+def failure(s):
+    """Why `refresh` failed: not finite (a smaller step may help) or singular."""
+    total = 0.0
+    for x in floats(inner(s, STATE.w), WORK.r2):
+        total += abs(x)
+    phi, phi_v = largest_errors(s)
+    return NEWTON.singular if total + phi + phi_v < math.inf else NEWTON.not_finite
 
 
 @compiled
@@ -171,27 +166,33 @@ def line_search(m, s, c0, before):
 
 
 @compiled
+def closing_correction(m, s, c0):
+    """Correction x that brings phi and phi_q v, as evaluated, to 0 and leaves r1 and r2 alone."""
+    w, b, active = inner(s, STATE.w), floats(s, STATE.b), naturals(m, MODEL.active)
+    phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
+    n, k = naturals(m, MODEL.free).shape[0], active.shape[0]
+    b[: 2 * n] = 0.0
+    for i in range(k):
+        b[2 * n + i] = -phi[active[i]]
+        b[2 * n + k + i] = -phi_v[active[i]] / c0
+    run_part(m, s, PARTS.newton_solution)
+
+
+@compiled
 def close_constraints(m, s, o, c0):
-    """Bring phi and phi_q v below their tolerance with corrections that leave r1 and r2 alone; False if they resist.
+    """Bring phi and phi_q v below their tolerance by corrections that leave r1 and r2 alone; False if they resist.
 
     Newton's test looks at the tolerance of the run; constraints are to hold much better. Their rows alone are evaluated
     and solved for with the matrix at hand, at a third of the cost of a full iteration. Velocities are of the size of c0
     times positions, and so is their tolerance.
     """
-    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), naturals(m, MODEL.active)
-    phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
-    n, k = naturals(m, MODEL.free).shape[0], active.shape[0]
     for _ in range(MAX_CLOSINGS):
         run_part(m, s, PARTS.constraints)
         error, error_v = largest_errors(s)
         if error <= o.constraint_tol and error_v <= o.constraint_tol * max(1.0, 1e-3 * c0):
             return True
-        b[: 2 * n] = 0.0
-        for i in range(k):
-            b[2 * n + i] = -phi[active[i]]
-            b[2 * n + k + i] = -phi_v[active[i]] / c0
-        run_part(m, s, PARTS.newton_solution)
-        apply(m, s, c0, x, 1.0)
+        closing_correction(m, s, c0)
+        apply(m, s, c0, floats(s, STATE.x), 1.0)
     return False
 
 
@@ -210,8 +211,8 @@ def newton(m, s, o, c0, close):
     set_rates(s, c0)
     fresh = count[COUNTS.stale] == 1 or abs(c0 / clock[CLOCK.c0_factored] - 1.0) > C0_CHANGE
     if fresh:
-        if not refresh(m, s, c0):
-            return failure(m, s, c0), 0
+        if not refresh(m, s, c0, PARTS.newton_matrix):
+            return failure(s), 0
     else:
         run_part(m, s, PARTS.residual)
     contraction, before = clock[CLOCK.contraction], 0.0
@@ -247,8 +248,8 @@ def newton(m, s, o, c0, close):
         if k > 0 and fresh and rest > o.newton_tol:
             # Too slow to end in time (Hairer and Wanner 1996, IV.8), as where a kink lies between guess and solution: a
             # fibre that stops shortening needs the matrix of the far side.
-            if not refresh(m, s, c0):
-                return failure(m, s, c0), k
+            if not refresh(m, s, c0, PARTS.newton_matrix):
+                return failure(s), k
         else:
             run_part(m, s, PARTS.residual)
     return (NEWTON.diverged if fresh else NEWTON.stale_matrix), MAX_ITERATIONS

@@ -24,6 +24,16 @@ OTHER_SIZE = 10.0
 
 
 @compiled
+def note_pivot(s, pivot):
+    """Take note of the smallest relative pivot of a Newton matrix that a step of any method has factorised."""
+    clock = floats(s, STATE.clock)
+    clock[CLOCK.pivot] = pivot
+    clock[CLOCK.best_pivot] = max(clock[CLOCK.best_pivot], pivot)
+    if pivot > LEFT_BEHIND * clock[CLOCK.singular_pivot]:
+        clock[CLOCK.singular_pivot] = 0.0
+
+
+@compiled
 def pivots_weaken(m, s):
     """True where other rows or pivots should be taken, before the ones at hand have cost too many digits."""
     clock = floats(s, STATE.clock)

@@ -8,6 +8,7 @@ from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import complexes, floats, inner
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.linear_solve import back_substitute, factorise
+from dms_core.simulation.order_watch import note_pivot
 from dms_core.simulation.radau_constants import COMPLEX, REAL
 from dms_core.simulation.radau_state import RADAU
 from dms_core.simulation.state import CLOCK, STATE
@@ -17,17 +18,17 @@ from dms_core.simulation.state import CLOCK, STATE
 def radau_matrices(m, s):
     """Residual and both factorised matrices at the iterate, for the c0 in clock[CLOCK.c0_factored].
 
-    clock[CLOCK.pivot] is the smaller of their smallest relative pivots.
+    The pivot that is noted is the smaller of their smallest relative ones.
     """
-    clock, values, radau = floats(s, STATE.clock), floats(s, STATE.newton_values), inner(s, STATE.radau)
-    complex_values, c0 = complexes(radau, RADAU.values), clock[CLOCK.c0_factored]
+    values, radau = floats(s, STATE.newton_values), inner(s, STATE.radau)
+    complex_values, c0 = complexes(radau, RADAU.values), floats(s, STATE.clock)[CLOCK.c0_factored]
     evaluate_newton_pair(
         inner(m, MODEL.dynamics), inner(m, MODEL.constraints), inner(m, MODEL.newton), inner(s, STATE.w), c0, values,
         c0 / REAL * COMPLEX, complex_values,
     )  # fmt: skip
     one = factorise(m, MODEL.newton_lu, values, floats(s, STATE.newton_work))
     other = factorise(m, MODEL.newton_lu, complex_values, complexes(radau, RADAU.work))
-    clock[CLOCK.pivot] = min(one, other)
+    note_pivot(s, min(one, other))
 
 
 @compiled

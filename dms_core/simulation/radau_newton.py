@@ -9,8 +9,8 @@ import math
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import complexes, floats, inner, ints, matrix, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.newton import NEWTON, largest_errors
-from dms_core.simulation.parts import PARTS, SINGULAR_PIVOT, run_part
+from dms_core.simulation.newton import NEWTON, closing_correction, failure, largest_errors, refresh
+from dms_core.simulation.parts import PARTS, run_part
 from dms_core.simulation.radau_constants import COMPLEX, REAL, STAGES, T_INVERSE, T
 from dms_core.simulation.radau_stages import evaluate_stages, guess_stages, put_stage
 from dms_core.simulation.radau_state import RADAU
@@ -90,28 +90,6 @@ def apply_corrections(m, s, c0):
 
 
 @compiled
-def refresh(m, s, t, h):
-    """Both matrices at the guess of the middle stage; False if one is singular."""
-    clock, count = floats(s, STATE.clock), ints(s, STATE.counts)
-    clock[CLOCK.c0_factored], clock[CLOCK.contraction] = REAL / h, 0.0
-    count[COUNTS.factorisations] += 1
-    count[COUNTS.stale] = count[COUNTS.age] = 0
-    put_stage(m, s, MIDDLE, t, h)
-    run_part(m, s, PARTS.radau_matrices)
-    return clock[CLOCK.pivot] > SINGULAR_PIVOT
-
-
-@compiled
-def finite_residual(s):
-    """Whether the evaluated residual is finite."""
-    w, total = inner(s, STATE.w), 0.0
-    for x in floats(w, WORK.r2):
-        total += abs(x)
-    phi, phi_v = largest_errors(s)
-    return total + phi + phi_v < math.inf
-
-
-@compiled
 def tolerance(o):
     """Largest error that the iteration may leave: the method errs much less than its estimate says (RADAU5: kappa)."""
     rtol = o.rtol ** (2.0 / 3.0)
@@ -125,9 +103,8 @@ def close_constraints(m, s, o, c0):
     Where rounding does not allow that for velocities, c0 times positions, what a stage of the other methods may leave
     is allowed. False if they resist.
     """
-    w, b, x, active = inner(s, STATE.w), floats(s, STATE.b), floats(s, STATE.x), naturals(m, MODEL.active)
-    q, v, phi, phi_v = floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.phi), floats(w, WORK.phi_v)
-    free, k = naturals(m, MODEL.free), active.shape[0]
+    w, x, free = inner(s, STATE.w), floats(s, STATE.x), naturals(m, MODEL.free)
+    q, v = floats(w, WORK.q), floats(w, WORK.v)
     n, before = free.shape[0], math.inf
     for closing in range(MAX_CLOSINGS):
         run_part(m, s, PARTS.constraints)
@@ -137,11 +114,7 @@ def close_constraints(m, s, o, c0):
             if error_v <= o.constraint_tol * (max(1.0, 1e-3 * c0) if rounding else 1.0):
                 return True
         before = error_v
-        b[: 2 * n] = 0.0
-        for i in range(k):
-            b[2 * n + i] = -phi[active[i]]
-            b[2 * n + k + i] = -phi_v[active[i]] / c0
-        run_part(m, s, PARTS.newton_solution)
+        closing_correction(m, s, c0)
         for i in range(n):
             q[free[i]] += x[i]
             v[free[i]] += c0 * x[n + i]
@@ -198,8 +171,9 @@ def solve_stages(m, s, o, t, h, started):
         if code == NEWTON.stale_matrix:
             guess_stages(m, s, h, started)
     if code == NEWTON.stale_matrix:
-        if not refresh(m, s, t, h):
-            return (NEWTON.singular if finite_residual(s) else NEWTON.not_finite), iterations
+        put_stage(m, s, MIDDLE, t, h)
+        if not refresh(m, s, c0, PARTS.radau_matrices):
+            return failure(s), iterations
         code, more = iterate(m, s, o, t, h, True)
         iterations += more
     return code, iterations

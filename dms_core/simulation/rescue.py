@@ -19,6 +19,8 @@ LOOK_AGAIN = 0.3
 """Share of a pivot to which it may fall beside a singular position before that is looked at again."""
 MOST_RESCUES = 8
 """Times in one call that an iteration which fails at every step size is given another order of elimination."""
+Place = tuple[int, float, int | None]
+"""Where an order was chosen anew: code, time, decimal logarithm of c0; None where nearby states were looked at too."""
 HELPED = (OUTCOME.matrix_singular, OUTCOME.rates_failed, OUTCOME.newton_failed, OUTCOME.step_too_small)
 """Ways to stop that another order of elimination may help."""
 
@@ -29,7 +31,7 @@ class Rescue(Inspection):
     _singular: str
     """Why no order could be chosen, in a sentence."""
 
-    def _help(self, code: int, tried: set[tuple[int, float, int]]) -> bool:
+    def _help(self, code: int, tried: set[Place]) -> bool:
         """Do something about a matrix that is singular, or soon will be; False if nothing is left that was not tried.
 
         Args:
@@ -38,32 +40,45 @@ class Rescue(Inspection):
         """
         clock, asked = self.state.clock, code == OUTCOME.matrix_singular
         c0 = float(clock[CLOCK.c0_factored]) or TYPICAL_C0
-        place = (code, self.time, round(math.log10(c0)))
-        usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
-        watched = usable and not ordered_for_another_size(self._tables.table, self._world.table)
-        if place in tried and watched:
-            clock[CLOCK.best_pivot] = 0.0
-            return True
-        if place in tried or (not asked and sum(p[0] == code for p in tried) >= MOST_RESCUES):
-            usual = (code, self.time, -1)
-            if not asked or usual in tried:
-                return asked and self._shorten()
-            tried.add(usual)
-            # A command that saturates within the step leaves no pivot where the present state shows one.
-            return self.reorder(nearby=True) or self._shorten()
+        place: Place = (code, self.time, round(math.log10(c0)))
+        known, rescues = place in tried, sum(p[0] == code for p in tried)
         tried.add(place)
-        weak = clock[CLOCK.pivot] < WEAK * clock[CLOCK.best_pivot]
+        usable = asked and clock[CLOCK.pivot] > SINGULAR_PIVOT
+        if usable and not ordered_for_another_size(self._tables.table, self._world.table):
+            self._heed_weak_pivot(c0, known)
+            return True
+        if asked and known:
+            return self._pass_saturation((code, self.time, None), tried)
+        if known or (not asked and rescues >= MOST_RESCUES):
+            return False
         clock[CLOCK.best_pivot] = 0.0
-        if watched and singular_joints(self.model, self.state.q, self.time)[0]:
-            # No choice of rows or pivots is a good one here, and one that is made here is none for later.
-            clock[CLOCK.best_pivot] = LOOK_AGAIN * clock[CLOCK.pivot] / WEAK
-            clock[CLOCK.singular_pivot] = LEFT_BEHIND * clock[CLOCK.pivot]
-            return True
-        if watched and not weak:
-            return True
         if code == OUTCOME.rates_failed:
             self.state.counts[COUNTS.restart] = 1
         return self.reorder(c0 if asked or self.options.fixed_step else TYPICAL_C0) or usable
+
+    def _heed_weak_pivot(self, c0: float, known: bool) -> None:
+        """Choose an order anew in time, or know the position as singular; nothing where that was done (`known`)."""
+        clock = self.state.clock
+        weak = clock[CLOCK.pivot] < WEAK * clock[CLOCK.best_pivot]
+        clock[CLOCK.best_pivot] = 0.0
+        if known:
+            return
+        if singular_joints(self.model, self.state.q, self.time)[0]:
+            # No choice of rows or pivots is a good one here, and one that is made here is none for later.
+            clock[CLOCK.best_pivot] = LOOK_AGAIN * clock[CLOCK.pivot] / WEAK
+            clock[CLOCK.singular_pivot] = LEFT_BEHIND * clock[CLOCK.pivot]
+        elif weak:
+            self.reorder(c0)
+
+    def _pass_saturation(self, place: Place, tried: set[Place]) -> bool:
+        """Another order, once, or a shorter step; False if neither is left.
+
+        A command that saturates within the step leaves no pivot where the present state shows one.
+        """
+        if place in tried:
+            return self._shorten()
+        tried.add(place)
+        return self.reorder(nearby=True) or self._shorten()
 
     def reorder(self, c0: float = TYPICAL_C0, nearby: bool = False) -> bool:
         """Choose rows and pivots anew where the old ones are, or soon will be, singular; False if nothing helps.

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from dms_core.assembly.layout import GROUND_COORDINATES
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.model.constraints.rope_length import RopeLength
@@ -92,6 +93,7 @@ class SlackSimulation:
         self.options = options or SolverOptions()
         self._simulation, self._models = simulation, dict[frozenset[str], Model]()
         self._ropes = {rope.name: rope for rope in unilateral_ropes(self.model.system)}
+        self._calls = {c.element.name: c for c in self.model.layout.constraints if c.element.name in self._ropes}
         for rope in self._ropes.values():
             _check_taut(self.model.system, rope)
         self.taut = frozenset(self._ropes)
@@ -121,7 +123,7 @@ class SlackSimulation:
             phase = self._phase()
             loose = [name for name in self._ropes if name not in self.taut]
             taut = sorted(self.taut)
-            rows = [phase.model.layout.row_names.index(f"{name}.length") for name in taut]
+            rows = [_row_of(phase, name) for name in taut]
 
             def read(phase=phase, rows=rows, loose=loose) -> np.ndarray:  # noqa: ANN001
                 return np.concatenate([phase.state.lam[rows], [self._excess(phase, name) for name in loose]])
@@ -160,8 +162,8 @@ class SlackSimulation:
 
     def _excess(self, phase: Any, name: str) -> float:
         """Length of the path of a slack rope beyond that of the rope [m]."""
-        call = next(c for c in self.model.layout.constraints if c.element.name == name)
-        q = np.concatenate([phase.state.q, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])[call.iq]
+        call = self._calls[name]
+        q = np.concatenate([phase.state.q, GROUND_COORDINATES])[call.iq]
         ip, par = np.array(call.placement.integers, np.int32), np.array(call.placement.numbers)
         psi = phase.operating_point().u[call.iu[0], 0] if len(call.iu) else par[0]
         return float(path_length(ip, 1, par, 1, q) - psi)
@@ -169,21 +171,23 @@ class SlackSimulation:
     def _phase(self) -> Any:
         """A simulation of the taut ropes from the present state; ropes that would push at once are let go."""
         while True:
-            phase = self._simulation(self._model(self.taut), self.options)
-            phase.state.q[:], phase.state.v[:] = self._q, self._v
-            phase.state.clock[CLOCK.t] = self.time
+            phase = self._with(self.taut)
             if not self.taut or phase.settle() is not Result.SUCCESS:
                 return phase
-            rows = {name: phase.model.layout.row_names.index(f"{name}.length") for name in self.taut}
+            rows = {name: _row_of(phase, name) for name in self.taut}
             name = min(rows, key=lambda n: phase.state.lam[rows[n]])
             if phase.state.lam[rows[name]] >= -NO_TENSION:
                 return phase
             self.taut -= {name}
 
-    def _model(self, taut: frozenset[str]) -> Model:
+    def _with(self, taut: frozenset[str]) -> Any:
+        """A simulation of these taut ropes from the present state."""
         if taut not in self._models:
             self._models[taut] = Model(_system(self.model.system, taut))
-        return self._models[taut]
+        phase = self._simulation(self._models[taut], self.options)
+        phase.state.q[:], phase.state.v[:] = self._q, self._v
+        phase.state.clock[CLOCK.t] = self.time
+        return phase
 
     def _take(self, phase: Any) -> None:
         """Keep what a phase has computed, in the rows of the whole model."""
@@ -205,9 +209,7 @@ class SlackSimulation:
         """The impact with which a rope becomes taut; ropes that would have to push in it are let go."""
         taut = self.taut | {name}
         while True:
-            phase = self._simulation(self._model(taut), self.options)
-            phase.state.q[:], phase.state.v[:] = self._q, self._v
-            phase.state.clock[CLOCK.t] = self.time
+            phase = self._with(taut)
             point = phase.operating_point(behind=True)
             blocks = phase.blocks(point)
             bodies = phase.model.layout.of_bodies
@@ -222,6 +224,11 @@ class SlackSimulation:
                 self.taut = taut
                 return
             taut -= {min(pushing, key=lambda n: impulse[f"{n}.length"])}
+
+
+def _row_of(phase: Any, name: str) -> int:
+    """Constraint row of a taut rope in a phase."""
+    return phase.model.layout.row_names.index(f"{name}.length")
 
 
 def _check_taut(system: System, rope: RopeLength) -> None:

@@ -25,22 +25,20 @@ from dms_core.model.signals import Function
 from dms_core.results import Result
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.radau_state import NOT_USED
-from dms_core.simulation.state import CLOCK, State, with_tables
+from dms_core.simulation.state import CLOCK, State, with_storage
 
 GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")
 """Fields of Work that outlive a kernel call; the others are local arrays, written before they are read."""
 
 
 class Orders(NamedTuple):
-    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders, nominal sizes."""
+    """What of a world's tables was chosen at some state: rows that are solved for, scatter, orders."""
 
     active: np.ndarray
     newton: NewtonPattern
     newton_lu: LuTables
     rates: RatePattern
     rate_lu: LuTables
-    scale_q: np.ndarray
-    scale_v: np.ndarray
     redundant: int
     c0_ordered: np.ndarray
 
@@ -146,11 +144,40 @@ def put_back(snapshot: Snapshot, tables: Packed, old_tables: Packed, world: Pack
     Raises:
         InputError: the snapshot is damaged; names the part. Nothing was written then.
     """
-    if tables is not old_tables:
-        world = with_tables(tables.values, world.values)
-    parts = list(_held_parts(world.values))
-    _check_sizes(snapshot, parts)
-    for (_, array), data in zip(parts, snapshot.arrays, strict=True):
+    world = _fitted(world, tables, old_tables)
+    _check_sizes(snapshot, list(_held_parts(world.values)))
+    return _written(world, snapshot.arrays)
+
+
+class Mark(NamedTuple):
+    """A place in time that the same world can be put back to: a Snapshot without what tells it from other worlds."""
+
+    time: float
+    result: Result
+    tables: Packed
+    arrays: tuple[bytes, ...]
+    rows: int
+    """Pieces of the record until then."""
+
+
+def mark(tables: Packed, state: State, result: Result) -> Mark:
+    """The world as it is now, without a record."""
+    return Mark(float(state.clock[CLOCK.t]), result, tables, tuple(x.tobytes() for x in held_arrays(state)), 0)
+
+
+def go_back(past: Mark, tables: Packed, world: Packed) -> Packed:
+    """The packed world, solved with `tables` now, with the values of a mark."""
+    return _written(_fitted(world, past.tables, tables), past.arrays)
+
+
+def _fitted(world: Packed, tables: Packed, old_tables: Packed) -> Packed:
+    """The packed world with storage for these tables."""
+    return world if tables is old_tables else with_storage(tables.values, world.values)
+
+
+def _written(world: Packed, arrays: tuple[bytes, ...]) -> Packed:
+    """The world, whose arrays get these bytes."""
+    for array, data in zip(held_arrays(world.values), arrays, strict=True):
         array[...] = np.frombuffer(data, array.dtype).reshape(array.shape)
     return world
 

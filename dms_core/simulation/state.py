@@ -209,19 +209,32 @@ def rewind(s, q, v, step):
 
 
 @compiled
+def begin_matrix(s, c0):
+    """Say that the Newton matrix is factorised anew, for this c0 [1/s]: nothing is known of how it contracts."""
+    clock, counts = floats(s, STATE.clock), ints(s, STATE.counts)
+    clock[CLOCK.c0_factored], clock[CLOCK.contraction] = c0, 0.0
+    counts[COUNTS.factorisations] += 1
+    counts[COUNTS.stale] = counts[COUNTS.age] = 0
+
+
+@compiled
 def renumber(s):
     """Say that numbers of the model have changed, such as a mass: the next step begins with their rates and factors."""
     counts = ints(s, STATE.counts)
     counts[COUNTS.restart], counts[COUNTS.stale], counts[COUNTS.rates_factored] = 1, 1, 0
 
 
+def with_storage(tables: Tables, state: State) -> Packed:
+    """The same world with fresh storage for other rows and elimination orders; nothing is written into its arrays."""
+    radau = new_radau_state(tables, len(state.lam), state.radau is not NOT_USED)
+    return Packed(State(**{**state._asdict(), **_linear_arrays(tables), "radau": radau}))
+
+
 def with_tables(tables: Tables, state: State) -> Packed:
     """The same world, in the same motion, for other rows and elimination orders; multipliers are the caller's."""
     state.counts[COUNTS.stale], state.counts[COUNTS.rates_factored] = 1, 0
     state.clock[CLOCK.best_pivot] = state.clock[CLOCK.singular_pivot] = 0.0
-    used = state.radau is not NOT_USED
-    if used:
+    if state.radau is not NOT_USED:
         # Its last step's polynomial belongs to the rows that were; the next step begins without one.
         state.counts[COUNTS.restart] = 1
-    radau = new_radau_state(tables, len(state.lam), used)
-    return Packed(State(**{**state._asdict(), **_linear_arrays(tables), "radau": radau}))
+    return with_storage(tables, state)

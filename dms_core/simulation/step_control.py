@@ -202,6 +202,18 @@ def size_behind(m, s, o, h, error, iterations):
 
 
 @compiled
+def find_rates(m, s, o, c0):
+    """Accelerations and multipliers that belong to q and v behind a step; False if there are none.
+
+    Those of a stage are of order 1 (Radau IIA: 3) only. With c0 > 0 the matrix of the next step is made with them.
+    """
+    if o.method != METHOD.bdf2 and run_rates(m, s, PARTS.stage_rates, c0):
+        return True
+    # Those of Radau IIA's last stage, of order 3, stand in where a kink of a fibre leaves none for its q and v.
+    return run_rates(m, s, PARTS.consistent_rates, 0.0) or o.method == METHOD.radau5
+
+
+@compiled
 def one_step(m, s, o, stop, kept):
     """Attempts until one step is accepted; gives OUTCOME.done or what went wrong. `kept`: the step is recorded."""
     clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
@@ -257,17 +269,9 @@ def one_step(m, s, o, stop, kept):
     accept(s, h, c0, started)
     if h == rest:
         land(s, stop)
-    # Multipliers and accelerations of a stage are of order 1 (Radau IIA: 3); those that belong to its q and v are of
-    # the method's order. Methods without a past want them between two landings only for a record.
+    # Methods without a past want rates between two landings only for a record.
     wanted_rates = started if o.method == METHOD.bdf2 else kept or h == rest
-    stage_c0 = c0 if h == rest and o.method == METHOD.sdirk2 else 0.0
-    if (
-        wanted_rates
-        and not (o.method != METHOD.bdf2 and run_rates(m, s, PARTS.stage_rates, stage_c0))
-        and not run_rates(m, s, PARTS.consistent_rates, 0.0)
-        # Those of Radau IIA's last stage, of order 3, stand in where a kink of a fibre leaves none for its q and v.
-        and o.method != METHOD.radau5
-    ):
+    if wanted_rates and not find_rates(m, s, o, c0 if h == rest and o.method == METHOD.sdirk2 else 0.0):
         return OUTCOME.rates_failed
     if equal:
         clock[CLOCK.worst] = max(clock[CLOCK.worst], error)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dms_core import Simulation, SolverOptions, simulate
+from dms_core import Simulation, SolverOptions, World, simulate
+from dms_core.simulation.state import CLOCK, COUNTS
 from tests.dms_core.cases import model
 from tests.dms_core.mechanisms.study import energy
 
 METHODS = ["bdf2", "sdirk2"]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, "radau5"])
 @pytest.mark.parametrize(("name", "t_end"), [("bennett", 1.0), ("bricard", 1.5)])
 def test_rows_are_chosen_anew_in_time(name, t_end, method):
     """The rows of the start become dependent at 0.474 and 1.248 s; with them, both runs end there."""
@@ -24,6 +25,41 @@ def test_rows_are_chosen_anew_in_time(name, t_end, method):
     # The local error of 1e-7 adds up over thousands of steps; 3e-5 was seen.
     assert np.abs(total - total[0]).max() < 1e-4 * kinetic.max()
     assert run.stats.largest_phi < 1e-9
+
+
+@pytest.mark.parametrize(("name", "t_end"), [("bennett", 1.0), ("bricard", 1.5)])
+def test_pivots_of_radau_are_watched(name, t_end):
+    """Before its iterations fail, not behind them: 0.8 and 0.6 failures a step without, 0.3 and 0.4 with a watch."""
+    simulation = Simulation(model(name), SolverOptions(rtol=1e-6, method="radau5"))
+    simulation.advance(t_end)
+    stats = simulation.trajectory().check().stats
+    assert stats.rejected_newton < 0.5 * stats.steps
+
+
+@pytest.mark.parametrize("method", [*METHODS, "radau5"])
+def test_a_singular_position_that_is_left_behind_is_forgotten(method):
+    """Its pivot is a thousandth of that of the first matrix of the step."""
+    simulation = Simulation(model("bennett"), SolverOptions(method=method))
+    simulation.advance(0.1)
+    clock = simulation.state.clock
+    assert clock[CLOCK.best_pivot] >= clock[CLOCK.pivot] > 0.0
+    clock[CLOCK.singular_pivot] = 1e-3 * clock[CLOCK.pivot]
+    simulation.state.counts[COUNTS.stale] = 1
+    simulation.advance_once(1.0)
+    assert clock[CLOCK.singular_pivot] == 0.0
+
+
+@pytest.mark.parametrize("nearby", [False, True])
+def test_other_orders_keep_the_sizes_that_were_written(nearby):
+    """Sizes are numbers of the model, which an environment writes for each patient; so are tolerances, then."""
+    world = World(model("bennett"))
+    sizes = world.model.tables.values.scale_q, world.model.tables.values.scale_v
+    for factor, size in zip((3.0, 5.0), sizes, strict=True):
+        size *= factor
+    assert world.reorder(nearby=nearby)
+    assert world.tables is not world.model.tables
+    for kept, size in zip((world.tables.values.scale_q, world.tables.values.scale_v), sizes, strict=True):
+        np.testing.assert_array_equal(kept, size)
 
 
 def test_the_motion_does_not_show_where_rows_were_chosen_anew():
