@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dms_core.figures import drawn
+from dms_core.figures import drawn, letter
 from exo_env.ecosystem.sensors import tension_sensor
 from exo_env.paper.scenarios import ScenarioRun
 from exo_env.paper.summary import SHOWN_MUSCLES, SHOWN_ROPES, magnitude
 from exo_env.rendering.curves import Curve, difference, draw, told, told_apart
-from dms_core.figures import letter
 from exo_env.rendering.panels import COLOURS, DASHES, legend, note, panels, save
 from exo_env.rendering.quantities import quantity
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dms_core.figures import drawn
+from dms_core.figures import drawn, letter
 from exo_env.rendering.curves import Curve, difference, draw, told, told_apart
-from dms_core.figures import letter
 from exo_env.rendering.panels import COLOURS, legend, literal, note, panels, save
 
 from ..episodes.time_course import TimeCourse
