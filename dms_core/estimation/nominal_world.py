@@ -15,6 +15,9 @@ from dms_core.simulation.dynamics import World
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.state import CLOCK, rewind
 
+FINER = 6
+"""Times that the steps of a period are halved before it is given up."""
+
 
 class NominalWorld(World):
     """A world by SDIRK2, a method without a past, so that any state can follow a correction.
@@ -48,15 +51,20 @@ class NominalWorld(World):
             into[:] = numbers
         self._written = dict(values)
 
-    def go(self, t: float, steps: int) -> None:
-        """Advance to t [s] in equal steps.
+    def go(self, t: float, steps: int) -> int:
+        """Advance to t [s] in equal steps, in more of them where Newton's method needs it; gives their number.
 
         Raises:
             SimulationError: the equations cannot be solved on the way; says where and why.
         """
-        self._numbers = self._numbers._replace(fixed_step=(t - self.time) / steps)
-        if self._solve(t, None) is not Result.SUCCESS:
-            raise SimulationError(self.message)
+        begin, whole = self.mark(), t - self.time
+        for finer in range(FINER):
+            self._numbers = self._numbers._replace(fixed_step=whole / (steps << finer))
+            if self._solve(t, None) is Result.SUCCESS:
+                return steps << finer
+            why = self.message
+            self.rewind(begin)
+        raise SimulationError(why)
 
     def settled(self) -> None:
         """Rates and multipliers that belong to the present state.

@@ -156,6 +156,7 @@ def estimate(
 
     Raises:
         InputError: nothing was measured, or an estimated input, constant or bias is not told by the record.
+        SimulationError: the filter diverged at every reading.
     """
     _check_inputs(kalman, measurements)
     timeline = events(measurements, kalman)
@@ -204,6 +205,8 @@ def _filtered(
         kalman.hold(event.inputs)
         if progress is not None:
             progress(event.t)
+    if len(diverged) == len(timeline):
+        raise SimulationError(f"the filter diverged at every reading. {diverged[0].sentence}")
     return steps, diverged
 
 

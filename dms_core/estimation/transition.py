@@ -57,13 +57,14 @@ def transition(
         SimulationError: the equations cannot be solved on the way.
     """
     model, n = world.model, chart.size
-    h = (t - world.time) / steps
+    dt = t - world.time
+    steps = world.go(t, steps)
+    h = dt / steps
     Z = np.zeros((n + len(inputs), n + len(inputs)))
     Z[:n, :n], Z[:n, n:] = h * linear.A, h * linear.B[:, list(inputs)]
     one = np.eye(len(Z))
     inverse = np.linalg.inv(one - GAMMA * Z)
     whole = np.linalg.matrix_power(inverse @ inverse @ (one + (1.0 - 2.0 * GAMMA) * Z), steps)
-    world.go(t, steps)
     q, v = world.state.q.copy(), world.state.v.copy()
     end = chart_at(model, q, v, t, chart)
     back = np.linalg.inv(in_chart(end, linear))

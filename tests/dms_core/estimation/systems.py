@@ -41,7 +41,7 @@ def masses(n: int = 2, stiffness: float = 40.0, damping: float = 0.4) -> System:
     )  # fmt: skip
 
 
-def slider_crank(force: float = 0.0, rate: float = 3.0) -> System:
+def slider_crank(force: float = 0.0) -> System:
     """A crank of 0.1 m, a rod of 0.3 m and a piston along x, pushed by a force."""
     crank, long, turn = 0.1, 0.3, 0.7
     pin = (crank * math.cos(turn), crank * math.sin(turn), 0.0)
@@ -50,7 +50,7 @@ def slider_crank(force: float = 0.0, rate: float = 3.0) -> System:
     return System(
         "slider-crank",
         bodies=[
-            rod("crank", crank, 1.0, angle=turn).model_copy(update={"angular_velocity": (0.0, 0.0, rate)}),
+            rod("crank", crank, 1.0, angle=turn),
             rod("rod", long, 0.5, pin, lean), PointMass(name="piston", mass=0.4, position=(end, 0.0, 0.0)),
         ],
         constraints=[
