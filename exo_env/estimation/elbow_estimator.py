@@ -79,7 +79,7 @@ class ElbowEstimator:
         channels = {
             ANGLE: Channel(deviation=2e-4, quantum=1.5e-3), RATE: Channel(deviation=0.02),
             GUIDE_FORCE: Channel(deviation=t.guide),
-            **{f"{tension_sensor(r)}.tension": Channel(deviation=1.0) for r in self.elbow.device.ropes},
+            **{tension_sensor(r): Channel(deviation=1.0) for r in self.elbow.device.ropes},
         }  # fmt: skip
         if imu:
             channels[f"{FOREARM_IMU}.angular_velocity.z"] = Channel(deviation=0.02)
