@@ -57,7 +57,7 @@ class ParameterBlocks(NamedTuple):
     """Elements and constraints whose kernels were differenced; the others that p moves gave an analytic derivative."""
 
 
-class _Direction(NamedTuple):
+class Direction(NamedTuple):
     """Half the difference of all numbers between p + h and p - h."""
 
     step: float
@@ -132,9 +132,9 @@ class ParameterDerivatives:
         most = max(len(c.placement.numbers) for c in calls)
         slopes = Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((1, 3)), np.zeros((len(work.q_l), most)))
         self._slopes = Packed(slopes)
-        self._directions: dict[tuple[str, str], _Direction] = {}
+        self._directions: dict[tuple[str, str], Direction] = {}
 
-    def _direction(self, name: str, path: str, declared: Layout) -> _Direction:
+    def _direction(self, name: str, path: str, declared: Layout) -> Direction:
         """What the number moves in a declared layout.
 
         Raises:
@@ -157,7 +157,7 @@ class ParameterDerivatives:
                 strict=True,
             )
         ]  # fmt: skip
-        direction = _Direction(h, *halves)
+        direction = Direction(h, *halves)
         if own:
             self._directions[name, path] = direction
         return direction
@@ -178,7 +178,7 @@ class ParameterDerivatives:
             )
         return declared
 
-    def _check_written(self, who: str, direction: _Direction, declared: Layout) -> None:
+    def _check_written(self, who: str, direction: Direction, declared: Layout) -> None:
         """Refuse to move numbers of a kernel that are not those of the declaration.
 
         Raises:
