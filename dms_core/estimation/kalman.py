@@ -28,7 +28,7 @@ from dms_core.estimation.estimated import Belief, Estimated
 from dms_core.estimation.gaussian import corrected, gain, is_usable, truncated
 from dms_core.estimation.nominal_world import NominalWorld
 from dms_core.estimation.settings import FilterSettings
-from dms_core.estimation.transition import difference_step, in_chart, linear_here, transition
+from dms_core.estimation.transition import Transitions, difference_step, in_chart, linear_here
 
 ITERATIONS, SMALL = 20, 1e-9
 """Corrections of the iterated form, and the last one over the deviations."""
@@ -85,6 +85,7 @@ class KalmanFilter:
         self.model, self.settings = model, settings
         self.world = NominalWorld(model)
         self.estimated = Estimated(model, settings)
+        self._transitions = Transitions(self.world, self.estimated.inputs)
         self._mean = self.estimated.start
         self._known: dict[int, float] = {}
 
@@ -116,13 +117,11 @@ class KalmanFilter:
         Raises:
             SimulationError: the equations cannot be solved on the way.
         """
-        world, es = self.world, self.estimated
+        es = self.estimated
         dt = t - belief.t
         steps = self._steps(dt)
         self.put(belief)
-        linear = linear_here(world)
-        self.put(belief)
-        end = transition(world, belief.chart, linear, t, steps, es.inputs)
+        end = self._transitions.over(belief.chart, t, steps)
         n0, n1, m = belief.chart.size, end.chart.size, len(belief.rest)
         A = np.zeros((n1 + m, n0 + m))
         A[:n1, :n0], A[:n1, n0 : n0 + len(es.inputs)] = end.A, end.B

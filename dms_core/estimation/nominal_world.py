@@ -13,7 +13,7 @@ from dms_core.model.signals import Constant
 from dms_core.results import Result
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.options import SolverOptions
-from dms_core.simulation.state import CLOCK, rewind
+from dms_core.simulation.state import CLOCK, Options, rewind
 
 FINER = 6
 """Times that the steps of a period are halved before it is given up."""
@@ -30,6 +30,11 @@ class NominalWorld(World):
         super().__init__(model, SolverOptions(method="sdirk2", rtol=1e-6, fixed_step=1.0))
         self._declared = tuple(x.copy() for x in model.numbers[:3])
         self._written: dict[tuple[str, str], float] = {}
+
+    @property
+    def numbers(self) -> Options:
+        """Options of the solver, for compiled code."""
+        return self._numbers
 
     def put(self, q: np.ndarray, v: np.ndarray, t: float) -> None:
         """Go to a state on the constraints, shape (n_q,) each, at a time [s]."""

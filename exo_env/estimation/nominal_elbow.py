@@ -25,7 +25,6 @@ from dms_core.model import (
     PathPoint,
     PlaneGuide,
     Revolute,
-    RigidBody,
     RopeForce,
     RopeSensor,
     System,
