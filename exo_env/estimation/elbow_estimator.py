@@ -1,4 +1,4 @@
-"""The filter of a worn device: from hinge, ropes and cuff to the moment that everything but the device puts on an elbow.
+"""The filter of a worn device: from hinge and cuff to the moment that everything but the device puts on an elbow.
 
 The noise of the channels is that of the device's own data sheet (`tasks/elbow.py`). How fast the unknown moment changes
 and how far it goes, and how wrong the device's own model may be, were chosen on patients of `mixed`.
@@ -15,29 +15,35 @@ import numpy as np
 from dms_core import Model
 from dms_core.errors import SimulationError
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings, KalmanFilter
+from dms_core.estimation.charts import chart_at
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.settings import InitialDeviations, MotionNoise
-from exo_env.ecosystem.sensors import FOREARM_IMU, tension_sensor
-from exo_env.estimation.nominal_elbow import CUFF, HAND, OTHERS, PULLS, SLIP, NominalElbow, tension_input
+from dms_core.estimation.settings import InitialDeviations
+from exo_env.ecosystem.sensors import FOREARM_IMU
+from exo_env.estimation.nominal_elbow import CUFF, GRIP, NET, NominalElbow
 
 ANGLE, RATE = "exo_angle.angle", "exo_angle.rate"
 GUIDE_FORCE = f"{CUFF}.Fx"
 """Force of the lower link on the forearm along the link's x axis."""
 
+GYRO = f"{FOREARM_IMU}.angular_velocity.z"
+SPECIFIC_FORCE = tuple(f"{FOREARM_IMU}.specific_force.{x}" for x in "xy")
+TURNS, MOST_TURN, SMALL = 30, 0.2, 1e-9
+"""Steps in which a model is turned to the first reading, the largest one, and the error that is left [rad]."""
+
 
 class Tuning(NamedTuple):
     """What the filter takes for granted of the unknown; chosen on patients of `mixed`."""
 
-    deviation: float = 8.0
-    """Of the moment of all others in the long run [Nm]."""
-    time_constant: float = 0.5
+    net: float = 0.085
+    """Moment that moves the arm, in the long run [Nm]."""
+    net_time: float = 0.15
     """In which it forgets [s]."""
-    slip: float = 0.5
-    """Of the hinge's open moment [Nm]."""
+    grip: float = 0.3
+    """How far the moment between device and others walks in a second [Nm / sqrt s]."""
     guide: float = 0.5
-    """Of the cuff's force [N], what the nominal body leaves open included."""
-    tension_walk: float = 400.0
-    """Of a rope's tension [N / sqrt s]."""
+    """Noise of the cuff's force [N]."""
+    specific_force: float = 0.25
+    """Noise of the inertial sensor, what it is worn askew included [m/s^2]."""
 
 
 class Moment(NamedTuple):
@@ -47,10 +53,6 @@ class Moment(NamedTuple):
     """Moment that all but the device puts on the elbow, into flexion [Nm]."""
     deviation: float
     """Standard deviation of it [Nm]."""
-    angle: float
-    """Elbow angle [rad]."""
-    rate: float
-    """[rad/s]"""
 
 
 class ElbowEstimator:
@@ -79,48 +81,37 @@ class ElbowEstimator:
         channels = {
             ANGLE: Channel(deviation=2e-4, quantum=1.5e-3), RATE: Channel(deviation=0.02),
             GUIDE_FORCE: Channel(deviation=t.guide),
-            **{tension_sensor(r): Channel(deviation=1.0) for r in self.elbow.device.ropes},
         }  # fmt: skip
         if imu:
-            channels[f"{FOREARM_IMU}.angular_velocity.z"] = Channel(deviation=0.02)
-            channels |= {f"{FOREARM_IMU}.specific_force.{x}": Channel(deviation=0.2) for x in "xy"}
+            channels[GYRO] = Channel(deviation=0.02)
+            channels |= {name: Channel(deviation=t.specific_force) for name in SPECIFIC_FORCE}
         inputs = {
-            OTHERS: EstimatedInput(deviation=t.deviation, time_constant=t.time_constant),
-            SLIP: EstimatedInput(deviation=t.slip, time_constant=1.0),
-            **{tension_input(r): EstimatedInput(deviation=50.0, walk=t.tension_walk) for r in self.elbow.device.ropes},
+            NET: EstimatedInput(deviation=t.net, time_constant=t.net_time),
+            GRIP: EstimatedInput(deviation=20.0, walk=t.grip),
         }
-        if self.elbow.load_cell:
-            channels |= {f"{pull}_cell.F{x}": Channel(deviation=1.0) for pull, x in zip(PULLS, "xy", strict=True)}
-            inputs |= {hand: EstimatedInput(deviation=20.0, walk=100.0) for hand in HAND}
         return FilterSettings(
             period=self.period, steps=steps, channels=channels, inputs=inputs,
-            noise=MotionNoise(acceleration=0.02), initial=InitialDeviations(position=0.01, velocity=0.05),
+            initial=InitialDeviations(position=0.01, velocity=0.05),
         )  # fmt: skip
 
     def reset(self, readings: Mapping[str, float]) -> Moment:
         """Begin with first readings, by channel."""
-        start = self.kalman.start()
-        chart, hinge = start.chart, readings[ANGLE]
-        for _ in range(30):
+        start, hinge = self.kalman.start(), readings[ANGLE]
+        row = self.kalman.estimated.outputs[ANGLE]
+        for _ in range(TURNS):
             # Turn the model to the measured angle in steps that a projection follows.
-            out = self.kalman.read_out(start)
-            row = self.kalman.estimated.outputs[ANGLE]
-            error = math.remainder(hinge - out.y[row], 2.0 * math.pi)
-            n = len(start.chart.chosen)
-            by_angle = out.C[row, :n]
-            change = np.zeros(len(start.P))
-            change[:n] = by_angle / float(by_angle @ by_angle) * float(np.clip(error, -0.3, 0.3))
-            start = self.kalman.moved(start, start.mean + change)
-            if abs(error) < 1e-9:
+            out, n = self.kalman.read_out(start), len(start.chart.chosen)
+            error, by_angle = math.remainder(hinge - out.y[row], 2.0 * math.pi), out.C[row, :n]
+            if abs(error) < SMALL:
                 break
-        assert chart is not None
-        self._start = self._belief = self._at(start)
+            change = np.zeros(len(start.P))
+            change[:n] = by_angle / float(by_angle @ by_angle) * float(np.clip(error, -MOST_TURN, MOST_TURN))
+            start = self._at(self.kalman.moved(start, start.mean + change))
+        self._belief = self._at(start)
         return self.update(readings, first=True)
 
     def _at(self, belief: Belief) -> Belief:
         """The belief with the covariance of a start, in its own chart."""
-        from dms_core.estimation.charts import chart_at
-
         chart = chart_at(self.kalman.model, belief.q, belief.v, 0.0)
         return Belief(0.0, belief.q, belief.v, belief.rest, chart, self.kalman.estimated.first_covariance(chart))
 
@@ -137,6 +128,6 @@ class ElbowEstimator:
             belief = self._at(self._belief)
         self._belief = belief
         k = belief.chart.size
-        y = self.kalman.read(belief)
-        at = self.kalman.estimated.outputs
-        return Moment(float(belief.rest[0]), float(belief.deviations[k]), float(y[at[ANGLE]]), float(y[at[RATE]]))
+        P = belief.P[k : k + 2, k : k + 2]
+        deviation = math.sqrt(P[0, 0] - 2.0 * P[0, 1] + P[1, 1])
+        return Moment(float(belief.rest[0] - belief.rest[1]), deviation)
