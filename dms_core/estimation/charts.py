@@ -90,6 +90,14 @@ def chart_at(
     return _with_basis(model, second, first, rows, chosen, G, W)
 
 
+def chart_with(model: Model, q: np.ndarray, v: np.ndarray, t: float, chosen: np.ndarray) -> Chart:
+    """The chart of given independent coordinates at a state."""
+    _, _, G, W = model.constraint_jacobian(q, v, t)
+    second, first = orders(model)
+    rows = independent_rows(G[:, second]).independent if model.n_phi else np.zeros(0, int)
+    return _with_basis(model, second, first, rows, chosen, G, W)
+
+
 def _best(motions: np.ndarray) -> np.ndarray:
     """Coordinates whose motions are told apart best, by QR with column pivoting, shape (n_z,)."""
     n = motions.shape[1]

@@ -189,12 +189,14 @@ class KalmanFilter:
         return Readout(linear.y, C)
 
     def correct(self, belief: Belief, readings: dict[str, float]) -> Correction:
-        """The belief behind readings of channels, by name, in SI units; those that are NaN tell nothing.
+        """The belief behind readings of channels, by name, in SI units.
+
+        Those that are NaN tell nothing, and nor do sensors that are no channel of the settings.
 
         Raises:
             SimulationError: no state on the constraints is near the corrected one, or the result is not finite.
         """
-        names = [name for name, y in readings.items() if not np.isnan(y)]
+        names = [name for name in self.settings.channels if not np.isnan(readings.get(name, np.nan))]
         if not names:
             return Correction(belief, 0.0, np.zeros(0))
         y = np.array([readings[name] for name in names])

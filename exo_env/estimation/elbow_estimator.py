@@ -1,21 +1,22 @@
 """The filter of a worn device: from hinge and cuff to the moment that everything but the device puts on an elbow.
 
 The noise of the channels is that of the device's own data sheet (`tasks/elbow.py`). How fast the unknown moment changes
-and how far it goes, and how wrong the device's own model may be, were chosen on patients of `mixed`.
+and how far it goes, and how wrong the device's own model may be, were chosen on patients of `mixed` and `wide`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from dms_core import Model
 from dms_core.errors import SimulationError
-from dms_core.estimation import Channel, EstimatedInput, FilterSettings, KalmanFilter
+from dms_core.estimation import Channel, EstimatedInput, FilterSettings
 from dms_core.estimation.charts import chart_at
+from dms_core.estimation.compiled_filter import CompiledFilter
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.settings import InitialDeviations
 from exo_env.ecosystem.sensors import FOREARM_IMU
@@ -29,17 +30,23 @@ GYRO = f"{FOREARM_IMU}.angular_velocity.z"
 SPECIFIC_FORCE = tuple(f"{FOREARM_IMU}.specific_force.{x}" for x in "xy")
 TURNS, MOST_TURN, SMALL = 30, 0.2, 1e-9
 """Steps in which a model is turned to the first reading, the largest one, and the error that is left [rad]."""
+USUAL_NET = 0.3
+"""Size of the moment that moves an arm, before anything of it is learnt [Nm]."""
 
 
 class Tuning(NamedTuple):
-    """What the filter takes for granted of the unknown; chosen on patients of `mixed`."""
+    """What the filter takes for granted of the unknown; chosen on patients of `mixed` and `wide`."""
 
-    net: float = 0.085
-    """Moment that moves the arm, in the long run [Nm]."""
-    net_time: float = 0.15
-    """In which it forgets [s]."""
+    least: float = 0.05
+    """Least size of the moment that moves the arm [Nm]; what it is of a patient is learnt."""
+    memory: float = 0.3
+    """Time over which that size is learnt [s]."""
+    net_time: float = 0.05
+    """In which the moment that moves the arm forgets [s]."""
     grip: float = 0.3
     """How far the moment between device and others walks in a second [Nm / sqrt s]."""
+    grip_share: float = 4.0
+    """That walk for each Nm that moves the arm, beside it [1 / sqrt s]."""
     guide: float = 0.5
     """Noise of the cuff's force [N]."""
     specific_force: float = 0.25
@@ -58,6 +65,9 @@ class Moment(NamedTuple):
 class ElbowEstimator:
     """Filter of one device on one arm.
 
+    The size of the moment that moves the arm, sigma^2 = E[net^2], differs a hundredfold between patients (tremor). It is
+    learnt on the way: d sigma^2/dt = (net^2 + its variance - sigma^2) / memory.
+
     Args:
         elbow: what the device takes for granted.
         period: between two readings [s].
@@ -70,10 +80,10 @@ class ElbowEstimator:
         self, elbow: NominalElbow, period: float, tuning: Tuning | None = None, steps: int = 1, imu: bool = False
     ) -> None:
         self.elbow, self.period, self.tuning = elbow, period, tuning or Tuning()
-        self.kalman = KalmanFilter(Model(elbow.system()), self._settings(steps, imu))
-        self._belief: Belief | None = None
+        self.filter = CompiledFilter(Model(elbow.system()), self._settings(steps, imu))
         self.lost = 0
         """Times that the filter began anew."""
+        self._power = 0.0
 
     def _settings(self, steps: int, imu: bool) -> FilterSettings:
         """Settings of the filter."""
@@ -86,7 +96,7 @@ class ElbowEstimator:
             channels[GYRO] = Channel(deviation=0.02)
             channels |= {name: Channel(deviation=t.specific_force) for name in SPECIFIC_FORCE}
         inputs = {
-            NET: EstimatedInput(deviation=t.net, time_constant=t.net_time),
+            NET: EstimatedInput(deviation=USUAL_NET, time_constant=t.net_time),
             GRIP: EstimatedInput(deviation=20.0, walk=t.grip),
         }
         return FilterSettings(
@@ -96,38 +106,45 @@ class ElbowEstimator:
 
     def reset(self, readings: Mapping[str, float]) -> Moment:
         """Begin with first readings, by channel."""
-        start, hinge = self.kalman.start(), readings[ANGLE]
-        row = self.kalman.estimated.outputs[ANGLE]
+        kalman, hinge = self.filter.kalman, readings[ANGLE]
+        start, row = kalman.start(), kalman.estimated.outputs[ANGLE]
         for _ in range(TURNS):
             # Turn the model to the measured angle in steps that a projection follows.
-            out, n = self.kalman.read_out(start), len(start.chart.chosen)
+            out, n = kalman.read_out(start), len(start.chart.chosen)
             error, by_angle = math.remainder(hinge - out.y[row], 2.0 * math.pi), out.C[row, :n]
             if abs(error) < SMALL:
                 break
             change = np.zeros(len(start.P))
             change[:n] = by_angle / float(by_angle @ by_angle) * float(np.clip(error, -MOST_TURN, MOST_TURN))
-            start = self._at(self.kalman.moved(start, start.mean + change))
-        self._belief = self._at(start)
-        return self.update(readings, first=True)
+            start = self._fresh(kalman.moved(start, start.mean + change))
+        self._power = USUAL_NET**2
+        self.filter.begin(self._fresh(start))
+        return self._taken(readings, self.filter.correct)
 
-    def _at(self, belief: Belief) -> Belief:
+    def _fresh(self, belief: Belief) -> Belief:
         """The belief with the covariance of a start, in its own chart."""
-        chart = chart_at(self.kalman.model, belief.q, belief.v, 0.0)
-        return Belief(0.0, belief.q, belief.v, belief.rest, chart, self.kalman.estimated.first_covariance(chart))
+        kalman = self.filter.kalman
+        chart = chart_at(kalman.model, belief.q, belief.v, 0.0)
+        return Belief(0.0, belief.q, belief.v, belief.rest, chart, kalman.estimated.first_covariance(chart))
 
-    def update(self, readings: Mapping[str, float], first: bool = False) -> Moment:
+    def update(self, readings: Mapping[str, float]) -> Moment:
         """Take the readings of the next period, by channel; NaN where there is none."""
-        assert self._belief is not None
-        belief = self._belief
+        a, t = self.filter.arrays, self.tuning
+        k = len(a.P) - len(a.rest)
+        power = max(self._power, t.least**2)
+        a.Q[k, k] = power * (1.0 - a.factor[0] ** 2)
+        a.Q[k + 1, k + 1] = (t.grip + t.grip_share * math.sqrt(power)) ** 2 * self.period
+        return self._taken(readings, self.filter.step)
+
+    def _taken(self, readings: Mapping[str, float], take: Callable[[Mapping[str, float]], None]) -> Moment:
+        """What is known behind readings."""
         try:
-            if not first:
-                belief = self.kalman.predict(belief, belief.t + self.period).belief
-            belief = self.kalman.correct(belief, dict(readings)).belief
+            take(readings)
         except SimulationError:
             self.lost += 1
-            belief = self._at(self._belief)
-        self._belief = belief
-        k = belief.chart.size
-        P = belief.P[k : k + 2, k : k + 2]
-        deviation = math.sqrt(P[0, 0] - 2.0 * P[0, 1] + P[1, 1])
-        return Moment(float(belief.rest[0] - belief.rest[1]), deviation)
+            self.filter.begin(self._fresh(self.filter.belief()))
+        a = self.filter.arrays
+        k = len(a.P) - len(a.rest)
+        net, grip, P = a.rest[0], a.rest[1], a.P[k : k + 2, k : k + 2]
+        self._power += self.period / self.tuning.memory * (net**2 + P[0, 0] - self._power)
+        return Moment(float(net - grip), math.sqrt(max(P[0, 0] - 2.0 * P[0, 1] + P[1, 1], 0.0)))
