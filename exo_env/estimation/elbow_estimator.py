@@ -39,13 +39,13 @@ class Tuning(NamedTuple):
 
     least: float = 0.05
     """Least size of the moment that moves the arm [Nm]; what it is of a patient is learnt."""
-    memory: float = 0.3
+    memory: float = 0.1
     """Time over which that size is learnt [s]."""
     net_time: float = 0.05
     """In which the moment that moves the arm forgets [s]."""
     grip: float = 0.3
     """How far the moment between device and others walks in a second [Nm / sqrt s]."""
-    grip_share: float = 4.0
+    grip_share: float = 2.0
     """That walk for each Nm that moves the arm, beside it [1 / sqrt s]."""
     guide: float = 0.5
     """Noise of the cuff's force [N]."""
@@ -65,8 +65,8 @@ class Moment(NamedTuple):
 class ElbowEstimator:
     """Filter of one device on one arm.
 
-    The size of the moment that moves the arm, sigma^2 = E[net^2], differs a hundredfold between patients (tremor). It is
-    learnt on the way: d sigma^2/dt = (net^2 + its variance - sigma^2) / memory.
+    The size of the moment that moves the arm, sigma^2 = E[net^2], differs a hundredfold between patients and is learnt
+    on the way: d sigma^2/dt = (net^2 + its variance - sigma^2) / memory.
 
     Args:
         elbow: what the device takes for granted.
@@ -74,13 +74,17 @@ class ElbowEstimator:
         tuning: noise of what is unknown.
         steps: implicit steps of a period.
         imu: whether the inertial sensor on the wrist is read.
+        like: an estimator of another body, whose orders of elimination are taken over.
     """
 
     def __init__(
-        self, elbow: NominalElbow, period: float, tuning: Tuning | None = None, steps: int = 1, imu: bool = False
-    ) -> None:
+        self, elbow: NominalElbow, period: float, tuning: Tuning | None = None, steps: int = 1, imu: bool = False,
+        like: ElbowEstimator | None = None,
+    ) -> None:  # fmt: skip
         self.elbow, self.period, self.tuning = elbow, period, tuning or Tuning()
-        self.filter = CompiledFilter(Model(elbow.system()), self._settings(steps, imu))
+        self.filter = CompiledFilter(
+            Model(elbow.system(), like=like.filter.kalman.model if like else None), self._settings(steps, imu)
+        )
         self.lost = 0
         """Times that the filter began anew."""
         self._power = 0.0
@@ -147,4 +151,6 @@ class ElbowEstimator:
         k = len(a.P) - len(a.rest)
         net, grip, P = a.rest[0], a.rest[1], a.P[k : k + 2, k : k + 2]
         self._power += self.period / self.tuning.memory * (net**2 + P[0, 0] - self._power)
-        return Moment(float(net - grip), math.sqrt(max(P[0, 0] - 2.0 * P[0, 1] + P[1, 1], 0.0)))
+        # What moves the arm is its acceleration times an inertia that is not the wearer's.
+        variance = P[0, 0] - 2.0 * P[0, 1] + P[1, 1] + (self.elbow.inertia_doubt * net) ** 2
+        return Moment(float(net - grip), math.sqrt(max(variance, 0.0)))

@@ -45,6 +45,9 @@ class NominalElbow(Settings):
 
     device: Exoskeleton = Field(default_factory=lambda: Exoskeleton.named("elbow"))
     person: Person = Field(default=Person(), description="body that stands for everyone's")
+    inertia_doubt: float = Field(
+        default=0.3, ge=0.0, lt=1.0, description="deviation of a wearer's inertia from this body's, as a part of it"
+    )
 
     def system(self, angle: float = 0.8) -> System:
         """The system, at rest at an elbow angle [rad]."""
@@ -63,7 +66,7 @@ class NominalElbow(Settings):
             sensors=[
                 JointAngle(name="exo_angle", joint=HINGE, pointer_i=tuple(worn.frame[:, 1]), pointer_j=(0.0, 1.0, 0.0)),
                 JointReaction(name=CUFF, constraint=GUIDE, body="forearm", frame=LOWER),
-                Imu(name=FOREARM_IMU, body="forearm", point=WRIST),
+                Imu(name=FOREARM_IMU, body="forearm", point=WRIST, gravity=arm.gravity),
             ],
             inputs=[Input(name=name, signal=Constant(value=0.0)) for name in (NET, GRIP)],
         )

@@ -52,10 +52,9 @@ def test_moment_of_a_heavier_arm_that_is_pushed(estimator):
 def test_a_start_at_any_angle(estimator):
     for angle in (0.3, 1.0, 2.2):
         estimator.reset({ANGLE: angle, RATE: 0.0, GUIDE_FORCE: 0.0})
-        belief = estimator._belief
-        assert belief is not None
-        y = estimator.kalman.read(belief)
-        assert y[estimator.kalman.estimated.outputs[ANGLE]] == pytest.approx(angle, abs=2e-3)
+        kalman = estimator.filter.kalman
+        y = kalman.read(estimator.filter.belief())
+        assert y[kalman.estimated.outputs[ANGLE]] == pytest.approx(angle, abs=2e-3)
 
 
 def test_readings_that_are_missing_widen_the_deviation(estimator):
