@@ -13,7 +13,6 @@ from dms_core.errors import InputError, choices
 from dms_core.estimation.charts import Chart
 from dms_core.estimation.nominal_world import declared_constant, held_input
 from dms_core.estimation.settings import FilterSettings, checked_covariance
-from dms_core.linear.null_space import null_space
 
 
 @dataclass(frozen=True)
@@ -138,9 +137,14 @@ class Estimated:
         an orthonormal basis of them.
 
         Raises:
-            InputError: a given matrix is not positive definite; names the entry.
+            InputError: a given matrix is not positive definite (names the entry), or there is nothing to estimate.
         """
         settings, names = self.settings.initial, self.names(chart)
+        if not names:
+            raise InputError(
+                f"system '{self.model.system.name}' has nothing to estimate: drivers move all its freedoms. Expected a free "
+                "motion, a state, or inputs, constants or biases in the settings."
+            )
         if settings.covariance is not None:
             return checked_covariance("initial.covariance", names, np.array(settings.covariance, ndmin=2))
         position = self._by_coordinate(settings.position, settings.state, settings.coordinates, "q.")
@@ -169,10 +173,12 @@ class Estimated:
 
     def _along(self, chart: Chart, deviations: np.ndarray) -> np.ndarray:
         """Covariance of the independent coordinates where all have these deviations along the motions allowed."""
+        if not len(chart.chosen):
+            return np.zeros((0, 0))
         second = np.flatnonzero(self.model.second_order)
         place = {int(k): i for i, k in enumerate(second)}
         # Motions allowed: the span of N.
-        T = np.linalg.qr(chart.N[second])[0] if len(chart.chosen) else null_space(np.zeros((0, 0)))
+        T = np.linalg.qr(chart.N[second])[0]
         whole = T @ (T.T @ np.diag(deviations[second] ** 2) @ T) @ T.T
         at = [place[int(k)] for k in chart.chosen]
         return whole[np.ix_(at, at)]

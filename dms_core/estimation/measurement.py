@@ -8,8 +8,6 @@ model: it was held at that value until the next row that tells one.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -76,6 +74,11 @@ def read_measurements(path: str | Path, model: Model, names: Sequence[str] | Non
             f"measurements '{path}': Expected one column of times, {' or '.join(TIME)}; the columns are: "
             f"{choices(heads)}."
         )
+    for head in heads:
+        if heads.count(head) > 1:
+            raise InputError(
+                f"measurements '{path}': column '{head}' stands {heads.count(head)} times; expected it once."
+            )
     found = {head: _target(path, head, model, degrees) for k, head in enumerate(heads) if k != time[0]}
     _check_targets(path, found, names)
     t, lines, values = [], [], []
@@ -164,10 +167,15 @@ def _table(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]], bool
     if first == len(lines):
         raise InputError(f"measurements '{path}' are empty. Expected a line of column names, then lines of numbers.")
     separator = max(",;\t", key=lines[first].count)
-    heads = [cell.strip() for cell in next(csv.reader([lines[first]], delimiter=separator))]
-    rows = csv.reader(io.StringIO("\n".join(lines[first + 1 :])), delimiter=separator)
-    numbered = ((first + 1 + rows.line_num, cells) for cells in rows if any(cell.strip() for cell in cells))
-    return heads, numbered, degrees
+    heads = [cell.strip() for cell in lines[first].split(separator)]
+    cells = ((k + 1, lines[k].split(separator)) for k in range(first + 1, len(lines)) if lines[k].strip())
+    return [_unquoted(head) for head in heads], ((line, list(map(_unquoted, row))) for line, row in cells), degrees
+
+
+def _unquoted(cell: str) -> str:
+    """A cell without the quotes that some programs write about it."""
+    text = cell.strip()
+    return text[1:-1].strip() if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
 def _reading(path: str | Path, line: int, heads: list[str], cells: list[str], k: int) -> float:

@@ -19,6 +19,8 @@ from dms_core.files.output_file import with_unit
 
 SAME_TIME = 1e-9
 """Time by which two readings may lie apart and still be of one time [s]."""
+MOST_EVENTS = 1_000_000
+"""Most times of a record, those between its readings included."""
 WINDOW, LOST = 20, 100.0
 """Corrections in a row whose mean NIS, over its expected value, tells that a filter has lost the motion."""
 
@@ -109,6 +111,9 @@ def events(measurements: Measurements, kalman: KalmanFilter) -> list[Event]:
     """Readings by the time that they tell of, known inputs, and times between so that no period is too long.
 
     A reading of a channel with delay d, stamped t, tells of t - d; what it tells of before 0 is left out.
+
+    Raises:
+        InputError: there would be more of them than memory and patience hold.
     """
     settings, layout = kalman.settings, kalman.model.layout
     at: dict[float, Event] = {}
@@ -125,7 +130,14 @@ def events(measurements: Measurements, kalman: KalmanFilter) -> list[Event]:
     for event in found:
         if whole:
             before = whole[-1].t
-            parts = int(np.ceil((event.t - before) / settings.period * (1.0 - 1e-9)))
+            gap = (event.t - before) / settings.period
+            if len(whole) + gap > MOST_EVENTS:
+                raise InputError(
+                    f"measurements: from {before:.6g} to {event.t:.6g} s nothing is told, which are {gap:.3g} periods "
+                    f"of {settings.period:g} s; expected at most {MOST_EVENTS:,} periods in a record. Cut it, or take a "
+                    "longer period."
+                )
+            parts = int(np.ceil(gap * (1.0 - 1e-9)))
             whole += [Event(before + (event.t - before) * i / parts, {}, {}) for i in range(1, parts)]
         whole.append(event)
     return whole

@@ -82,9 +82,8 @@ class ElbowEstimator:
         like: ElbowEstimator | None = None,
     ) -> None:  # fmt: skip
         self.elbow, self.period, self.tuning = elbow, period, tuning or Tuning()
-        self.filter = CompiledFilter(
-            Model(elbow.system(), like=like.filter.kalman.model if like else None), self._settings(steps, imu)
-        )
+        known: Model | None = like.filter.kalman.model if like is not None else None
+        self.filter: CompiledFilter = CompiledFilter(Model(elbow.system(), like=known), self._settings(steps, imu))
         self.lost = 0
         """Times that the filter began anew."""
         self._power = 0.0

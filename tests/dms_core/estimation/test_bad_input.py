@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, simulate
+from dms_core.config_files import config_file
 from dms_core.errors import InputError, ModelError
 from dms_core.estimation import FilterSettings
 from dms_core.estimation.gaussian import truncated
@@ -14,6 +15,7 @@ from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import checked_covariance
 from dms_core.model import Constant, Input, LineGuide, Point, PointMass, PositionDriver, System
+from dms_core.model_file import load
 from tests.dms_core.estimation.systems import driven_four_bar, masses
 
 CHANNEL = {"at1.position.x": {"deviation": 0.01}}
@@ -67,6 +69,12 @@ def test_an_input_of_a_constraint_is_refused():
     settings = FilterSettings(channels={"at.position.x": {"deviation": 1.0}}, inputs={"u": {"deviation": 1, "walk": 1}})
     with pytest.raises(InputError, match="moves position_driver 'shaker'"):
         KalmanFilter(Model(system), settings)
+
+
+def test_a_mechanism_whose_freedoms_are_all_driven_is_refused():
+    model = Model(load(config_file("models/four_bar.yaml")))
+    with pytest.raises(InputError, match="has nothing to estimate: drivers move all its freedoms"):
+        KalmanFilter(model, FilterSettings(channels={"crank_angle.angle": {"deviation": 1.0}})).start()
 
 
 def test_a_matrix_that_is_not_finite_is_refused():

@@ -70,6 +70,7 @@ REFUSED = {
     "no time": ("crank_angle.angle\n1\n", "Expected one column of times"),
     "time missing": ("time_s,crank_angle.angle\n,1\n", "line 2, column 'time_s'"),
     "two columns": ("time_s,crank_angle.angle,crank_angle.angle_deg\n0,1,1\n", "all tell 'crank_angle.angle'"),
+    "one column twice": ("time_s,crank_angle.angle,crank_angle.angle\n0,1,1\n", "'crank_angle.angle' stands 2 times"),
     "words": ("time_s,crank_angle.angle\n0,fast\n", "line 2, column 'crank_angle.angle': Expected a number, or an em"),
     "infinite": ("time_s,crank_angle.angle\n0,inf\n", "Expected a number"),
     "empty": ("", "empty"),
@@ -83,6 +84,12 @@ def test_what_is_refused(tmp_path, four_bar, case):
     text, said = REFUSED[case]
     with pytest.raises(InputError, match=said):
         read_measurements(written(tmp_path, text), four_bar, ("crank_angle.angle",))
+
+
+def test_quotes_about_cells_are_no_part_of_them(tmp_path, four_bar):
+    read = read_measurements(written(tmp_path, '"time_s","crank_angle.angle"\n"0","0.5"\n'), four_bar)
+    assert read.channels == ("crank_angle.angle",)
+    assert read.y[0, 0] == 0.5
 
 
 def test_a_storage_without_its_header_is_refused(tmp_path, four_bar):
@@ -104,6 +111,12 @@ class TestTimes:
         # 0.01 - 0.02 is before the start.
         np.testing.assert_allclose([e.t for e in found], [0.01, 0.03, 0.05, 0.075, 0.1])
         assert [list(e.readings) for e in found] == [["at1.position.x"], [], ["at1.position.x"], [], ["at0.position.x"]]
+
+    def test_a_hole_that_no_memory_holds_is_refused(self, pair):
+        kalman = KalmanFilter(pair, FilterSettings(channels={"at0.position.x": {"deviation": 0.01}}))
+        record = Measurements(np.array([0.0, 1e9]), ("at0.position.x",), np.ones((2, 1)), {})
+        with pytest.raises(InputError, match=r"from 0 to 1e\+09 s nothing is told.*at most 1,000,000 periods"):
+            events(record, kalman)
 
     def test_a_delay_that_is_told_costs_nothing(self, pair):
         """A sine by a sensor that is late by 30 ms is as good as by one that is not, and late where it is not told."""
