@@ -142,8 +142,8 @@ class Estimated:
         settings, names = self.settings.initial, self.names(chart)
         if not names:
             raise InputError(
-                f"system '{self.model.system.name}' has nothing to estimate: drivers move all its freedoms. Expected a free "
-                "motion, a state, or inputs, constants or biases in the settings."
+                f"system '{self.model.system.name}' has nothing to estimate: drivers move all its freedoms. Expected a "
+                "free motion, a state, or inputs, constants or biases in the settings."
             )
         if settings.covariance is not None:
             return checked_covariance("initial.covariance", names, np.array(settings.covariance, ndmin=2))

@@ -134,8 +134,8 @@ def events(measurements: Measurements, kalman: KalmanFilter) -> list[Event]:
             if len(whole) + gap > MOST_EVENTS:
                 raise InputError(
                     f"measurements: from {before:.6g} to {event.t:.6g} s nothing is told, which are {gap:.3g} periods "
-                    f"of {settings.period:g} s; expected at most {MOST_EVENTS:,} periods in a record. Cut it, or take a "
-                    "longer period."
+                    f"of {settings.period:g} s; expected at most {MOST_EVENTS:,} periods in a record. Cut it, or "
+                    "take a longer period."
                 )
             parts = int(np.ceil(gap * (1.0 - 1e-9)))
             whole += [Event(before + (event.t - before) * i / parts, {}, {}) for i in range(1, parts)]
