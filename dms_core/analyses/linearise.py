@@ -27,8 +27,8 @@ import numpy as np
 
 from dms_core.analyses.independent import Independent, independent
 from dms_core.analyses.motion_names import motion_in_words
-from dms_core.assembly.blocks import Blocks, OperatingPoint
-from dms_core.assembly.input_derivatives import STEP
+from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
+from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError
 

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dms_core.assembly.connections import connected, driven_inputs
+from dms_core.assembly.pattern.connections import connected, driven_inputs
 from dms_core.errors import ModelError, choices
 from dms_core.model.element import GROUND, Constraint, Coordinate, DynamicElement, Placement, Sensor
 from dms_core.model.system import System

@@ -19,7 +19,7 @@ from dms_core.errors import SimulationError
 from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_csv, write_json
 from dms_core.files.outputs import Outputs
-from dms_core.model_tables import compiled
+from dms_core.model_files.model_tables import compiled
 from dms_core.results import Result
 from dms_core.simulation.dynamics import World
 

@@ -8,8 +8,8 @@ pytest.importorskip("sb3_contrib")
 
 from agents.distributed.sweep import in_order, planned
 from agents.distributed.variations import Variation, folder_of, read_variations
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from tests.agents.tiny import config_file
 
 SHIPPED = configs() / "ablations" / "hidden_intent.yml"
