@@ -203,6 +203,17 @@ class ParameterDerivatives:
                         "present numbers: parameter_blocks(..., system=...)."
                     )
 
+    def direction(self, name: str, path: str, system: System | None = None) -> Direction:
+        """What the number `path` of element `name` moves; `system` declares the present numbers.
+
+        Raises:
+            InputError: as in `of`.
+        """
+        declared = self._declared(system)
+        direction = self._direction(name, path, declared)
+        self._check_written(f"{declared.system.element(name).kind} '{name}': '{path}'", direction, declared)
+        return direction
+
     def of(self, name: str, path: str, point: OperatingPoint, system: System | None = None) -> ParameterBlocks:
         """Derivatives by the number `path` of element `name` at the point; `system` declares the present numbers.
 
@@ -210,9 +221,8 @@ class ParameterDerivatives:
             InputError: there is no such number, or the present numbers are not those of the system (default: that of
                 the model).
         """
-        declared, sensing, n = self._declared(system), self._sensing, self._layout.n_q
-        direction = self._direction(name, path, declared)
-        self._check_written(f"{declared.system.element(name).kind} '{name}': '{path}'", direction, declared)
+        sensing, n = self._sensing, self._layout.n_q
+        direction = self.direction(name, path, system)
         w = self._derivatives.put(point)
         dynamics, ptr = sensing.dynamics.values, sensing.dynamics.values.par_ptr
         analytic, rest = np.zeros(n + 7), direction.dynamics.copy()

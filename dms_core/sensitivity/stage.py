@@ -30,7 +30,7 @@ from dms_core.assembly.tables import CALLS, MODEL, WORK
 from dms_core.compiled.arena import floats, indices, inner, ints, matrix, naturals, table_at
 from dms_core.compiled.entries import SLOPES
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.tables import DIFFERENTIALS, MOVEMENT, Movement
+from dms_core.sensitivity.tables import DIFFERENTIALS, MOVEMENT, NUMBERS, Movement
 from dms_core.sensitivity.tables import STAGE as AT
 from dms_core.simulation.implicit_stage import LOCAL_SHARE
 from dms_core.simulation.linear_solve import back_substitute, factorise
@@ -39,9 +39,8 @@ from dms_core.simulation.parts import SINGULAR_PIVOT
 from dms_core.simulation.state import STATE
 
 PASSES = 4
-CLOSE = 1e-8
-"""Relative distance to the converged stage up to which its matrix is taken there: a correction with it leaves the
-square of that, and derivatives err by about as much."""
+STALLED = 0.1
+"""Share of the correction before above which one is rounding."""
 LEFT = 1e-14
 """Share of a solution that repeated solves leave of what the Newton matrix lacks."""
 MOST_SWEEPS = 12
@@ -156,6 +155,7 @@ def differentiate_stage(m, s, o, d, g, c0):
     """
     values, work = floats(g, AT.factors), floats(d, DIFFERENTIALS.work)
     b, x = floats(s, STATE.b), floats(s, STATE.x)
+    close, before = floats(d, DIFFERENTIALS.numbers)[NUMBERS.close] / (LOCAL_SHARE * o.rtol), math.inf
     for _ in range(PASSES):
         evaluate_stage(m, s, d, g, c0)
         if not factorise(m, MODEL.newton_lu, values, work) > SINGULAR_PIVOT:
@@ -166,8 +166,9 @@ def differentiate_stage(m, s, o, d, g, c0):
         if not norm < math.inf:
             return False
         apply(m, s, c0, x, 1.0)
-        if norm * LOCAL_SHARE * o.rtol < CLOSE:
+        if norm < close or norm > STALLED * before:
             break
+        before = norm
     _count_sweeps(d, g, c0)
     _by_inputs(m, s, d, g)
     _by_numbers(s, d, g)
