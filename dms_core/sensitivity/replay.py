@@ -110,7 +110,7 @@ class Replay(World):
         return h
 
     def _differentiate(self, k: int, h: float) -> bool:
-        kind, o = self.record.kind(k), self.options.numbers()
+        kind, o = self.record.kind(k), self._numbers
         tables = self._tables.table, self._world.table
         return bool(differentiated_step(*tables, o, self.differentials.table, h, kind))
 

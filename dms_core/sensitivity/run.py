@@ -82,6 +82,8 @@ class Sensitivity:
         known = self.model.parameter_derivatives
         self._directions = [known.direction(*number) for number in self.numbers]
         self.replay = Replay(record, self._directions)
+        spans = [(x.begin, x.end) if isinstance(x, Shift) else (np.inf, np.inf) for x in self.by]
+        self._begin, self._end = np.array(spans).reshape(-1, 2).T - 1e-12
         self._known: dict[int, Node] = {}
         self._start = start_columns(self.model, self.replay.point(0), self.numbers)
         names, (at, _, _) = self.model.layout.names, self._start
@@ -194,7 +196,7 @@ class Sensitivity:
     def _in_force(self, row: int) -> np.ndarray:
         """Whether each shift holds over the step that begins at a row, or for sensors that are read at it."""
         t = self.record.times[row]
-        return np.array([isinstance(x, Shift) and x.begin - 1e-12 <= t < x.end - 1e-12 for x in self.by])
+        return (self._begin <= t) & (t < self._end)
 
     def _row_shifts(self, row: int) -> np.ndarray:
         """Shifts that sensors at a row see: those of the step that ends there, or behind a jump of the next."""
