@@ -69,9 +69,9 @@ class RecordedWorld(World):
             if k % self.stride == 0:
                 self._kept[k] = self._last
             self.times.append(t)
-        if len(self._kept) > MOST_STATES:
-            self.stride *= 2
-            self._kept = {k: x for k, x in self._kept.items() if k % self.stride == 0}
+            if len(self._kept) > MOST_STATES:
+                self.stride *= 2
+                self._kept = {k: x for k, x in self._kept.items() if k % self.stride == 0}
 
     def restore(self, past: Snapshot) -> None:
         """As in World. The record begins there, and so does the method."""
