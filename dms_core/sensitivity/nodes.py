@@ -137,6 +137,4 @@ def node(
     dy = s.q[rows] @ dq + s.v[rows] @ rates.v + s.a[rows] @ rates.a + s.lam[rows] @ rates.lam
     by_q, by_v = np.zeros((len(rows), model.n_q)), np.zeros((len(rows), model.n_q))
     by_q[:, at.chosen], by_v[:, at.chosen], by_q[:, at.first] = np.split(dy[:, :n_x], [n_z, 2 * n_z], axis=1)
-    return Node(
-        s.y[rows], by_q, by_v, s.u[rows, :, 0] + dy[:, n_x : n_x + n_u], y_p + dy[:, n_x + n_u : n_x + every]
-    )
+    return Node(s.y[rows], by_q, by_v, s.u[rows, :, 0] + dy[:, n_x : n_x + n_u], y_p + dy[:, n_x + n_u : n_x + every])

@@ -73,7 +73,11 @@ CASES = {
 def test_derivatives_equal_differences_over_the_recorded_steps(name, method):
     of, steps = CASES[name]
     rtol = 1e-4 if name == "flexible" else 1e-6
-    _assert_equal(Sensitivity(_run(SYSTEMS[name](), method, (0.05, 0.1), rtol=rtol), of, tuple(steps)), steps, BENT.get(name, TOLERANCE))
+    _assert_equal(
+        Sensitivity(_run(SYSTEMS[name](), method, (0.05, 0.1), rtol=rtol), of, tuple(steps)),
+        steps,
+        BENT.get(name, TOLERANCE),
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
