@@ -104,8 +104,8 @@ def start_columns(
         if len(held) and np.abs(moved[held]).max() > 1e-12:
             k = held[int(np.argmax(np.abs(moved[held])))]
             raise InputError(
-                f"'{number.name}' moves '{model.layout.names[k]}', a coordinate of a body that is welded to the ground, "
-                "which a run takes for fixed. Expected a number that moves no welded body."
+                f"'{number.name}' moves '{model.layout.names[k]}', a coordinate of a body that is welded to the "
+                "ground, which a run takes for fixed. Expected a number that moves no welded body."
             )
     return at, dq, dv
 

@@ -17,7 +17,7 @@ from dms_core.simulation.snapshot import Mark, Snapshot
 from dms_core.simulation.state import COUNTS
 
 MOST_STATES = 8192
-"""States kept; beyond that every second one is dropped, and what lies between is computed again when it is asked for."""
+"""States kept; beyond that every second one is dropped, and what lies between is computed again when asked for."""
 
 
 class Row(NamedTuple):

@@ -49,7 +49,7 @@ class Replay(World):
         self.differentials = new_differentials(self.model, tables.values, self.state.w, self._movements, CLOSEST)
 
     def state_at(self, k: int) -> np.ndarray:
-        """(q, v) at row k and at the row before, shape (2, 2 n_q); steps from the kept one before it are taken again."""
+        """(q, v) at row k and at the row before, shape (2, 2 n_q), by steps from the kept row ahead of it."""
         first = k - k % self.record.stride
         if first == k:
             return self.record.kept(k)

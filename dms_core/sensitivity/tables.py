@@ -50,8 +50,8 @@ class Numbers(NamedTuple):
     """BDF2: cq by q_n and by q_(n-1)."""
     by_before: int
     close: int
-    """Relative distance to a converged stage up to which a matrix is taken there. A correction with it leaves the square
-    of that; derivatives err by about as much."""
+    """Relative distance to a converged stage up to which a matrix is taken there. A correction with it leaves the
+    square of that; derivatives err by about as much."""
 
 
 class Kind(NamedTuple):
