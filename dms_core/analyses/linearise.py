@@ -31,6 +31,8 @@ from dms_core.assembly.blocks import Blocks, OperatingPoint
 from dms_core.assembly.input_derivatives import STEP
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError
+from dms_core.results import Result
+from dms_core.simulation.dynamics import World
 
 GROWS = 1e-6
 """Real part over the largest |eigenvalue| above which a motion counts as growing: a double 0, as of a body that drifts,
@@ -150,14 +152,19 @@ class Linearisation:
 
 
 def linearise(
-    model: Model, point: OperatingPoint, *, held: Sequence[int] | np.ndarray = (), blocks: Blocks | None = None
+    model: Model | World,
+    point: OperatingPoint | None = None,
+    *,
+    held: Sequence[int] | np.ndarray = (),
+    blocks: Blocks | None = None,
 ) -> Linearisation:
-    """Linear system about a state of the model.
+    """Linear system about a state of the model, or about the present state of a world.
 
     Args:
-        model: a compiled model.
+        model: a compiled model; or a world, which is settled and taken as it is then: its accelerations and multipliers
+            become those that belong to its state and inputs.
         point: a state that satisfies the equations, as `World.operating_point` (behind `settle`) or
-            `Equilibrium.point` give it.
+            `Equilibrium.point` give it; with a model, and with a model only.
         held: coordinates of second order that are no states (an integral that moves nothing).
         blocks: equations there; default: the model's own, under the whole load.
 
@@ -167,11 +174,11 @@ def linearise(
         SimulationError: no accelerations belong to the state: a motion without inertia.
 
     Example:
-        >>> world = World(model)
-        >>> world.settle()
-        >>> linear = linearise(model, world.operating_point())
+        >>> linear = linearise(World(model))
         >>> linear.states, linear.eigenvalues
     """
+    if isinstance(model, World) or point is None:
+        model, point = _settled(model, point)
     b = model.derivatives.blocks(point) if blocks is None else blocks
     _check_state(model, point, b)
     G = b.phi_q.toarray()
@@ -200,6 +207,22 @@ def linearise(
         states, tuple(model.layout.input_index), tuple(model.layout.outputs),
         dq[:, :n_x].copy(),
     )  # fmt: skip
+
+
+def _settled(world: Model | World, point: OperatingPoint | None) -> tuple[Model, OperatingPoint]:
+    """Model and state of a world.
+
+    Raises:
+        InputError: both a world and a point were given, or neither.
+        SimulationError: no accelerations belong to the state.
+    """
+    if not isinstance(world, World):
+        raise InputError("linearise: Expected an operating point with a model, or a world alone, got a model alone.")
+    if point is not None:
+        raise InputError("linearise: Expected a world alone, or a model with an operating point, got both.")
+    if world.settle() is not Result.SUCCESS:
+        raise SimulationError(f"the system cannot be linearised: {world.result.value}")
+    return world.model, world.operating_point(behind=True)
 
 
 @dataclass(frozen=True)
