@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from dms_core.assembly.blocks import OperatingPoint
-from dms_core.assembly.parameter_derivatives import Direction
 from dms_core.compiled.arena import Packed
 from dms_core.errors import SimulationError
+from dms_core.sensitivity.nodes import Number
+from dms_core.sensitivity.radau import RadauStep
 from dms_core.sensitivity.record import RecordedWorld
 from dms_core.sensitivity.steps import carry_back, carry_forward, differentiated_step
 from dms_core.sensitivity.tables import CLOSEST, new_differentials, new_movement
@@ -25,13 +26,15 @@ class Replay(World):
 
     Args:
         record: a world that has run.
-        directions: declared numbers to differentiate by.
+        numbers: declared numbers to differentiate by.
     """
 
-    def __init__(self, record: RecordedWorld, directions: Sequence[Direction] = ()) -> None:
+    def __init__(self, record: RecordedWorld, numbers: Sequence[Number] = ()) -> None:
         super().__init__(record.model, record.options)
         self.record = record
-        self._directions = directions
+        self.numbers = tuple(numbers)
+        self.directions = [self.model.parameter_derivatives.direction(*number) for number in self.numbers]
+        self._radau: RadauStep | None = None
         self._signals = record.signals
         self._segment: tuple[int, list[np.ndarray]] = (-1, [])
         self._use(record.tables_at(0))
@@ -45,7 +48,7 @@ class Replay(World):
             tables.values, self.model.new_work(), self._signals, part_addresses(radau), start.q, start.v, radau
         )
         self.state = self._world.values
-        self._movements = [new_movement(tables.values, x) for x in self._directions]
+        self._movements = [new_movement(tables.values, x) for x in self.directions]
         self.differentials = new_differentials(self.model, tables.values, self.state.w, self._movements, CLOSEST)
 
     def state_at(self, k: int) -> np.ndarray:
@@ -110,16 +113,25 @@ class Replay(World):
         return h
 
     def _differentiate(self, k: int, h: float) -> bool:
+        if self.options.method == "radau5":
+            self._radau = RadauStep(self, self.numbers, h)
+            return self._radau.solved
         kind, o = self.record.kind(k), self._numbers
         tables = self._tables.table, self._world.table
         return bool(differentiated_step(*tables, o, self.differentials.table, h, kind))
 
     def forward(self, columns: Packed) -> None:
         """The columns through the step that was taken last."""
+        if self._radau is not None:
+            self._radau.forward(columns.values)
+            return
         carry_forward(self._tables.table, self.differentials.table, columns.table)
 
     def back(self, adjoints: Packed) -> None:
         """The adjoints through the step that was taken last."""
+        if self._radau is not None:
+            self._radau.back(adjoints.values)
+            return
         carry_back(self._tables.table, self.differentials.table, adjoints.table)
 
     def point(self, k: int) -> OperatingPoint:

@@ -79,9 +79,7 @@ class Sensitivity:
             raise InputError(f"system '{record.model.system.name}': nothing was computed; advance the world first.")
         self.record, self.model, self.of, self.by = record, record.model, tuple(of), tuple(by)
         self.numbers = tuple(dict.fromkeys(x for x in self.by if isinstance(x, Number)))
-        known = self.model.parameter_derivatives
-        self._directions = [known.direction(*number) for number in self.numbers]
-        self.replay = Replay(record, self._directions)
+        self.replay = Replay(record, self.numbers)
         spans = [(x.begin, x.end) if isinstance(x, Shift) else (np.inf, np.inf) for x in self.by]
         self._begin, self._end = np.array(spans).reshape(-1, 2).T - 1e-12
         self._known: dict[int, Node] = {}
@@ -93,6 +91,8 @@ class Sensitivity:
             if not self._is_state(output):
                 self._sensor(output)
         self._weights = self._weighted()
+        self.by_start: tuple[np.ndarray, np.ndarray] | None = None
+        """Behind `adjoint`: by q and v at the start in all coordinates, shape (k, n_q) twice."""
         self._check()
         _warn_of_contact(record)
 
@@ -162,7 +162,7 @@ class Sensitivity:
                   if w != 0.0 and not self._is_state(o)}  # fmt: skip
         rows = sorted(wanted)
         point = self.replay.point(row)
-        return rows, node(self.model, point, np.array(rows, int), self.numbers, self._directions)
+        return rows, node(self.model, point, np.array(rows, int), self.numbers, self.replay.directions)
 
     def _slopes(self, row: int) -> Node:
         """What all outputs owe to the state at a row: shapes as in Node, a row each output."""
@@ -256,16 +256,22 @@ class Sensitivity:
         found[:, moved] += slopes.by_p[:, self._number_of[moved]]
         return found
 
-    def adjoint(self, progress: Callable[[float], None] | None = None) -> np.ndarray:
-        """Derivatives by adjoints that are carried back from the end, shape (n_of, n_by)."""
-        adjoints = new_adjoints(self.model, len(self.of), len(self.numbers))
-        b, found = adjoints.values, np.zeros((len(self.of), len(self.by)))
+    def adjoint(self, progress: Callable[[float], None] | None = None, weights: np.ndarray | None = None) -> np.ndarray:
+        """Derivatives by adjoints that are carried back from the end, shape (n_of, n_by).
+
+        Args:
+            progress: called with the time that is reached on the way back.
+            weights: sums of outputs, shape (k, n_of), that are differentiated instead of each output: shape (k, n_by).
+        """
+        w = np.eye(len(self.of)) if weights is None else weights
+        adjoints = new_adjoints(self.model, len(w), len(self.numbers))
+        b, found = adjoints.values, np.zeros((len(w), len(self.by)))
         inputs, numbers = self._input_of, self._number_of
         for k in range(len(self.record.times) - 1, -1, -1):
             if k in self._weights:
-                found += self._explicit(k)
-                b.aq[:] += self._slopes(k).by_q
-                b.av[:] += self._slopes(k).by_v
+                found += w @ self._explicit(k)
+                b.aq[:] += w @ self._slopes(k).by_q
+                b.av[:] += w @ self._slopes(k).by_v
             if k and not self.record.row(k).start:
                 b.au[:] = 0.0
                 self.replay.step(k - 1)
@@ -275,6 +281,7 @@ class Sensitivity:
             if progress is not None:
                 progress(self.record.times[k])
         dq, dv = self._at_start()
+        self.by_start = b.aq.copy(), b.av.copy()
         found += b.aq @ dq.T + b.av @ dv.T
         moved = numbers >= 0
         found[:, moved] += b.ap[:, numbers[moved]]

@@ -18,14 +18,14 @@ from tests.dms_core.analyses.mechanisms import spring_mass_chain
 from tests.dms_core.sensitivity.again import difference
 from tests.dms_core.sensitivity.systems import SYSTEMS, controlled, pendulum
 
-METHODS = ["sdirk2", "bdf2"]
+METHODS = ["sdirk2", "bdf2", "radau5"]
 TOLERANCE = 1e-7
 """Of the largest derivative of an output: differences are good to about 1e-9, and those of a declared number, whose
 direction is itself a difference, to 1e-9 of the number's own effect."""
 BENT = {"arm": 1e-5}
 """As TOLERANCE where curves of muscles bend: their second derivatives jump, so that a difference errs with its step."""
-SAME = 1e-10
-"""Forward and adjoint do the same sums in another order over hundreds of steps."""
+SAME = {"sdirk2": 1e-10, "bdf2": 1e-10, "radau5": 3e-10}
+"""Forward and adjoint do the same sums in other orders over hundreds of steps; Radau IIA solves three stages at a time."""
 
 
 def _run(model: Model, method: str, times=(0.05, 0.12), settings=(), rtol: float = 1e-6) -> RecordedWorld:
@@ -41,7 +41,7 @@ def _run(model: Model, method: str, times=(0.05, 0.12), settings=(), rtol: float
 def _assert_equal(run: Sensitivity, steps: dict[By, float], tolerance: float = TOLERANCE) -> None:
     forward, adjoint = run.forward(), run.adjoint()
     size = np.abs(forward).max(axis=1, keepdims=True) + 1e-300
-    assert np.abs((forward - adjoint) / size).max() < SAME
+    assert np.abs((forward - adjoint) / size).max() < SAME[run.record.options.method]
     for k, x in enumerate(run.by):
         expected = difference(run, x, steps[x])
         scale = np.abs(expected).max() + 1e-9
@@ -61,7 +61,7 @@ CASES = {
     ),
     "arm": (
         (Output("v.forearm.x"), Output("q.agonist_motor.tension"), Output("q.BIClong.activation", 0.05)),
-        {Number("forearm", "mass"): 1e-5, Number("pid", "kp"): 0.1, Number("BIClong", "max_isometric_force"): 1e-1,
+        {Number("forearm", "mass"): 1e-5, Number("pid", "kp"): 0.1, Number("BIClong", "max_isometric_force"): 1e-2,
          Shift("assistance", 0.05): 1e-4},
     ),
     "flexible": ((Output("v.link.tip.y"),), {Number("weight", "acceleration.1"): 1e-2, Shift("load"): 1e-2}),
@@ -133,9 +133,9 @@ def test_what_lies_between_kept_states_is_computed_again(monkeypatch):
     for method in METHODS:
         whole = Sensitivity(_run(model, method), of, by)
         with monkeypatch.context() as m:
-            m.setattr(record_module, "MOST_STATES", 16)
+            m.setattr(record_module, "MOST_STATES", 4)
             few = _run(model, method)
-        assert few.stride > 1 and len(few._kept) <= 17
+        assert few.stride > 1 and len(few._kept) <= 5
         # States that are computed again are those of the run within the tolerance of Newton's method.
         np.testing.assert_allclose(Sensitivity(few, of, by).adjoint(), whole.adjoint(), rtol=1e-6)
 
