@@ -35,6 +35,7 @@ from dms_core.files.outputs import Outputs, partial
 from dms_core.model_files.model_tables import columns, compiled, heads
 from dms_core.model_files.schema import reference
 from dms_core.results import Result
+from dms_core.sensitivity.command import sensitivity
 from dms_core.simulation.dynamics import new_simulation
 from dms_core.simulation.events import Crossing
 from dms_core.simulation.options import MethodName
@@ -214,6 +215,7 @@ def main(arguments: list[str] | None = None) -> int:
             "kinematic": kinematic,
             "inverse": inverse,
             "modes": modes,
+            "sensitivity": sensitivity,
             "schema": schema,
         },
         "python -m dms_core",

@@ -12,7 +12,7 @@ PART, NEWTON, RATES, BLOCKS = fields(Part), fields(NewtonPattern), fields(RatePa
 
 
 @compiled
-def _scatter(part, e, local, factor, values):
+def scatter_part(part, e, local, factor, values):
     """values[slot] += factor local[i, j] for the entries of call e."""
     i, j, slot, ptr = naturals(part, PART.i), naturals(part, PART.j), naturals(part, PART.slot), ints(part, PART.ptr)
     for k in range(ptr[e], ptr[e + 1]):
@@ -32,55 +32,55 @@ def begin_newton(pattern, values):
 @compiled
 def scatter_dynamic(pattern, e, w, h, values):
     """The local derivatives of dynamic call e into the Newton matrix."""
-    _scatter(inner(pattern, NEWTON.Jq), e, matrix(w, WORK.Jq), h * h, values)
-    _scatter(inner(pattern, NEWTON.Jv), e, matrix(w, WORK.Jv), h, values)
-    _scatter(inner(pattern, NEWTON.Ja), e, matrix(w, WORK.Ja), 1.0, values)
+    scatter_part(inner(pattern, NEWTON.Jq), e, matrix(w, WORK.Jq), h * h, values)
+    scatter_part(inner(pattern, NEWTON.Jv), e, matrix(w, WORK.Jv), h, values)
+    scatter_part(inner(pattern, NEWTON.Ja), e, matrix(w, WORK.Ja), 1.0, values)
 
 
 @compiled
 def scatter_constraint(pattern, e, w, h, values):
     """The local derivatives of constraint call e into the Newton matrix."""
     G = matrix(w, WORK.G)
-    _scatter(inner(pattern, NEWTON.G_mu), e, G, -1.0, values)
-    _scatter(inner(pattern, NEWTON.G_lam), e, G, 1.0, values)
-    _scatter(inner(pattern, NEWTON.G_q), e, G, 1.0, values)
-    _scatter(inner(pattern, NEWTON.G_v), e, G, 1.0, values)
-    _scatter(inner(pattern, NEWTON.W), e, matrix(w, WORK.W), h, values)
-    _scatter(inner(pattern, NEWTON.H), e, matrix(w, WORK.H), h * h, values)
+    scatter_part(inner(pattern, NEWTON.G_mu), e, G, -1.0, values)
+    scatter_part(inner(pattern, NEWTON.G_lam), e, G, 1.0, values)
+    scatter_part(inner(pattern, NEWTON.G_q), e, G, 1.0, values)
+    scatter_part(inner(pattern, NEWTON.G_v), e, G, 1.0, values)
+    scatter_part(inner(pattern, NEWTON.W), e, matrix(w, WORK.W), h, values)
+    scatter_part(inner(pattern, NEWTON.H), e, matrix(w, WORK.H), h * h, values)
 
 
 @compiled
 def scatter_dynamic_rates(pattern, e, w, values):
     """The local derivatives of dynamic call e into the matrix of the acceleration problem."""
-    _scatter(inner(pattern, RATES.Jv), e, matrix(w, WORK.Jv), 1.0, values)
-    _scatter(inner(pattern, RATES.Ja), e, matrix(w, WORK.Ja), 1.0, values)
+    scatter_part(inner(pattern, RATES.Jv), e, matrix(w, WORK.Jv), 1.0, values)
+    scatter_part(inner(pattern, RATES.Ja), e, matrix(w, WORK.Ja), 1.0, values)
 
 
 @compiled
 def scatter_constraint_rates(pattern, e, w, values):
     """The local derivatives of constraint call e into the matrix of the acceleration problem."""
     G = matrix(w, WORK.G)
-    _scatter(inner(pattern, RATES.G_lam), e, G, 1.0, values)
-    _scatter(inner(pattern, RATES.G_v), e, G, 1.0, values)
+    scatter_part(inner(pattern, RATES.G_lam), e, G, 1.0, values)
+    scatter_part(inner(pattern, RATES.G_v), e, G, 1.0, values)
 
 
 @compiled
 def scatter_dynamic_blocks(pattern, e, w, by_q, by_v, by_a):
     """The local derivatives of dynamic call e into r2_q, r2_v, r2_a."""
-    _scatter(inner(pattern, BLOCKS.Jq), e, matrix(w, WORK.Jq), 1.0, by_q)
-    _scatter(inner(pattern, BLOCKS.Jv), e, matrix(w, WORK.Jv), 1.0, by_v)
-    _scatter(inner(pattern, BLOCKS.Ja), e, matrix(w, WORK.Ja), 1.0, by_a)
+    scatter_part(inner(pattern, BLOCKS.Jq), e, matrix(w, WORK.Jq), 1.0, by_q)
+    scatter_part(inner(pattern, BLOCKS.Jv), e, matrix(w, WORK.Jv), 1.0, by_v)
+    scatter_part(inner(pattern, BLOCKS.Ja), e, matrix(w, WORK.Ja), 1.0, by_a)
 
 
 @compiled
 def scatter_constraint_blocks(pattern, e, w, by_q, G, W):
     """The local derivatives of constraint call e into r2_q, phi_q, (phi_q v)_q."""
-    _scatter(inner(pattern, BLOCKS.H), e, matrix(w, WORK.H), 1.0, by_q)
-    _scatter(inner(pattern, BLOCKS.G), e, matrix(w, WORK.G), 1.0, G)
-    _scatter(inner(pattern, BLOCKS.W), e, matrix(w, WORK.W), 1.0, W)
+    scatter_part(inner(pattern, BLOCKS.H), e, matrix(w, WORK.H), 1.0, by_q)
+    scatter_part(inner(pattern, BLOCKS.G), e, matrix(w, WORK.G), 1.0, G)
+    scatter_part(inner(pattern, BLOCKS.W), e, matrix(w, WORK.W), 1.0, W)
 
 
 @compiled
 def scatter_projection_block(pattern, e, w, by_q):
     """H of constraint call e, evaluated with mu in place of lam, into (phi_q^T mu)_q."""
-    _scatter(inner(pattern, BLOCKS.H_mu), e, matrix(w, WORK.H), 1.0, by_q)
+    scatter_part(inner(pattern, BLOCKS.H_mu), e, matrix(w, WORK.H), 1.0, by_q)

@@ -141,7 +141,7 @@ class _Values(NamedTuple):
 _VALUES = fields(_Values)
 
 
-@compiled
+@compiled(forceinline=True)
 def _projection(y, calls, e, w, n):
     """H of constraint call e with mu in place of lam; False where all its mu are 0."""
     row, moved = y.row[e], False
@@ -156,6 +156,13 @@ def _projection(y, calls, e, w, n):
         clear(matrix(w, WORK.H), n, n)
         call_entry(y.kernel[e], calls, e, w, 1)
     return moved
+
+
+@compiled(forceinline=True)
+def scatter_projection(y, calls, pattern, e, w, n, by_mu):
+    """(phi_q^T mu)_q of constraint call e, evaluated in y, into by_mu; the local arrays are written over."""
+    if _projection(y, calls, e, w, n):
+        scatter_projection_block(pattern, e, w, by_mu)
 
 
 @compiled
@@ -177,8 +184,7 @@ def evaluate_blocks(dynamics, constraints, pattern, w, into):
         put_constraint_values(y, e, n)
         add_constraint_forces(y, e, n)
         scatter_constraint_blocks(pattern, e, w, by_q, G, W)
-        if _projection(y, constraints, e, w, n):
-            scatter_projection_block(pattern, e, w, by_mu)
+        scatter_projection(y, constraints, pattern, e, w, n, by_mu)
 
 
 class _Compressed:

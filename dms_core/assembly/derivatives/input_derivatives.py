@@ -60,9 +60,9 @@ def dynamic_by_input(calls, kernels, e, w, slopes):
 
 
 @compiled
-def _constraint_at_rates(x, calls, e, w, m, n, rates):
+def _constraint_at_rates(x, calls, e, w, m, n, rates, inputs):
     """phi_t of constraint call e for these rates of its inputs, without second derivatives."""
-    for k in range(rates.shape[0]):
+    for k in range(inputs):
         x.u_l[k, 1], x.u_l[k, 2] = rates[k], 0.0
     clear(x.G, m, n)
     for i in range(m):
@@ -70,30 +70,33 @@ def _constraint_at_rates(x, calls, e, w, m, n, rates):
     call_entry(x.kernel[e], calls, e, w, 0)
 
 
-@compiled(makes_arrays=True)
-def constraint_by_input(calls, e, w, by_value, rate_by_value):
-    """s_u and (s_u udot)_u of constraint call e at the state in w, shapes (m, k); the outputs are written over."""
+@compiled
+def constraint_by_input(calls, e, w, out):
+    """s_u and (s_u udot)_u of constraint call e at the state in w, shapes (m, k), in the first 2 m rows of `out`.
+
+    What follows there is written over: `out` has 2 m + 4 rows and as many columns as m and k at least.
+    """
     x = views(calls, w)
-    n, m = gather(x, e, False), by_value.shape[0]
-    inputs = by_value.shape[1]
-    rates, unit, both, square = np.empty(inputs), np.zeros(inputs), np.empty(inputs), np.empty(m)
+    n, m, inputs = gather(x, e, False), x.row[e + 1] - x.row[e], x.iu_ptr[e + 1] - x.iu_ptr[e]
+    rates, unit, both, square = out[2 * m], out[2 * m + 1], out[2 * m + 2], out[2 * m + 3]
     for k in range(inputs):
-        rates[k] = x.u_l[k, 1]
-    _constraint_at_rates(x, calls, e, w, m, n, rates)
+        rates[k], unit[k] = x.u_l[k, 1], 0.0
+    _constraint_at_rates(x, calls, e, w, m, n, rates, inputs)
     for i in range(m):
         square[i] = x.phi_t_l[i, 1]
     for k in range(inputs):
-        both[:] = rates
+        for j in range(inputs):
+            both[j] = rates[j]
         both[k] += 1.0
         unit[k] = 1.0
         # The mixed term of a quadratic form from its values: B(e, r) = (Q(e + r) - Q(e) - Q(r)) / 2.
-        _constraint_at_rates(x, calls, e, w, m, n, both)
+        _constraint_at_rates(x, calls, e, w, m, n, both, inputs)
         for i in range(m):
-            rate_by_value[i, k] = x.phi_t_l[i, 1] - square[i]
-        _constraint_at_rates(x, calls, e, w, m, n, unit)
+            out[m + i, k] = x.phi_t_l[i, 1] - square[i]
+        _constraint_at_rates(x, calls, e, w, m, n, unit, inputs)
         for i in range(m):
-            by_value[i, k] = x.phi_t_l[i, 0]
-            rate_by_value[i, k] = 0.5 * (rate_by_value[i, k] - x.phi_t_l[i, 1])
+            out[i, k] = x.phi_t_l[i, 0]
+            out[m + i, k] = 0.5 * (out[m + i, k] - x.phi_t_l[i, 1])
         unit[k] = 0.0
 
 
@@ -105,21 +108,22 @@ class InputDerivatives:
         sensing: a packed Sensing of that layout; numbers written into its tables later are read.
 
     Attributes:
+        kernels: addresses of the input kernels of all dynamic calls, 0 where there is none, shape (n_calls,).
+        dynamics: dynamic calls that read an input that is given.
+        constraints: constraint calls that read an input.
         differenced: names of the elements without an `input_kernel` of their own, whose kernels are differenced.
     """
 
     def __init__(self, layout: Layout, sensing: Packed) -> None:
         self._layout = layout
         self._sensing: Sensing = sensing.values
-        self._kernels = derivative_addresses(layout.dynamics, "input_kernel", INPUT_DERIVATIVE)
+        self.kernels = derivative_addresses(layout.dynamics, "input_kernel", INPUT_DERIVATIVE)
         # By an input that an element drives every derivative is 0.
         free = layout.input_index.keys() - layout.driven.keys()
         reading = [e for e, c in enumerate(layout.dynamics) if free.intersection(c.placement.inputs)]
-        self._dynamics = reading
-        self._constraints = [e for e, c in enumerate(layout.constraints) if len(c.iu)]
-        self.differenced = tuple(
-            dict.fromkeys(layout.dynamics[e].element.name for e in reading if not self._kernels[e])
-        )
+        self.dynamics = reading
+        self.constraints = [e for e, c in enumerate(layout.constraints) if len(c.iu)]
+        self.differenced = tuple(dict.fromkeys(layout.dynamics[e].element.name for e in reading if not self.kernels[e]))
         work = self._sensing.work.values
         n, k = len(work.q_l), len(work.u_l)
         slopes = Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((n, 3 * k)), np.zeros((n, 1)))
@@ -129,12 +133,12 @@ class InputDerivatives:
     def _sources(self, sensor: Call) -> list[int]:
         """Dynamic calls that read inputs, of the elements that a composed sensor sums."""
         calls = self._layout.dynamics
-        return [e for e in self._dynamics if calls[e].element.name in sensor.placement.sources]
+        return [e for e in self.dynamics if calls[e].element.name in sensor.placement.sources]
 
     def _of_call(self, e: int) -> np.ndarray:
         """Ju of dynamic call e, shape (n, k, 3)."""
         call, sensing = self._layout.dynamics[e], self._sensing
-        dynamic_by_input(sensing.dynamics.table, self._kernels, e, sensing.work.table, self._slopes.table)
+        dynamic_by_input(sensing.dynamics.table, self.kernels, e, sensing.work.table, self._slopes.table)
         Ju = self._slopes.values.Ju
         return Ju.reshape(len(Ju), -1, 3)[: len(call.iq), : len(call.iu)]
 
@@ -143,14 +147,15 @@ class InputDerivatives:
         layout, sensing = self._layout, self._sensing
         n_u = len(layout.input_index)
         r2 = np.zeros((layout.n_q + 7, n_u, 3))
-        for e in self._dynamics:
+        for e in self.dynamics:
             call = layout.dynamics[e]
             np.add.at(r2, (call.iq[:, None], call.iu[None, :]), self._of_call(e))
         r3, r4 = np.zeros((layout.n_phi, n_u, 3)), np.zeros((layout.n_phi, n_u, 3))
-        for e in self._constraints:
+        for e in self.constraints:
             call = layout.constraints[e]
-            by_value, rate_by_value = np.zeros((call.rows, len(call.iu))), np.zeros((call.rows, len(call.iu)))
-            constraint_by_input(sensing.constraints.table, e, sensing.work.table, by_value, rate_by_value)
+            out = np.zeros((2 * call.rows + 4, max(call.rows, len(call.iu))))
+            constraint_by_input(sensing.constraints.table, e, sensing.work.table, out)
+            by_value, rate_by_value = out[: call.rows], out[call.rows : 2 * call.rows]
             rows = slice(call.row, call.row + call.rows)
             for k, into in enumerate(call.iu):
                 r3[rows, into, 0] += by_value[:, k]

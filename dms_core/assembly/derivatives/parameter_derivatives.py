@@ -56,7 +56,7 @@ class ParameterBlocks(NamedTuple):
     """Elements and constraints whose kernels were differenced; the others that p moves gave an analytic derivative."""
 
 
-class _Direction(NamedTuple):
+class Direction(NamedTuple):
     """Half the difference of all numbers between p + h and p - h."""
 
     step: float
@@ -131,9 +131,9 @@ class ParameterDerivatives:
         most = max(len(c.placement.numbers) for c in calls)
         slopes = Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((1, 3)), np.zeros((len(work.q_l), most)))
         self._slopes = Packed(slopes)
-        self._directions: dict[tuple[str, str], _Direction] = {}
+        self._directions: dict[tuple[str, str], Direction] = {}
 
-    def _direction(self, name: str, path: str, declared: Layout) -> _Direction:
+    def _direction(self, name: str, path: str, declared: Layout) -> Direction:
         """What the number moves in a declared layout.
 
         Raises:
@@ -156,7 +156,7 @@ class ParameterDerivatives:
                 strict=True,
             )
         ]  # fmt: skip
-        direction = _Direction(h, *halves)
+        direction = Direction(h, *halves)
         if own:
             self._directions[name, path] = direction
         return direction
@@ -177,7 +177,7 @@ class ParameterDerivatives:
             )
         return declared
 
-    def _check_written(self, who: str, direction: _Direction, declared: Layout) -> None:
+    def _check_written(self, who: str, direction: Direction, declared: Layout) -> None:
         """Refuse to move numbers of a kernel that are not those of the declaration.
 
         Raises:
@@ -203,6 +203,17 @@ class ParameterDerivatives:
                         "present numbers: parameter_blocks(..., system=...)."
                     )
 
+    def direction(self, name: str, path: str, system: System | None = None) -> Direction:
+        """What the number `path` of element `name` moves; `system` declares the present numbers.
+
+        Raises:
+            InputError: as in `of`.
+        """
+        declared = self._declared(system)
+        direction = self._direction(name, path, declared)
+        self._check_written(f"{declared.system.element(name).kind} '{name}': '{path}'", direction, declared)
+        return direction
+
     def of(self, name: str, path: str, point: OperatingPoint, system: System | None = None) -> ParameterBlocks:
         """Derivatives by the number `path` of element `name` at the point; `system` declares the present numbers.
 
@@ -210,9 +221,8 @@ class ParameterDerivatives:
             InputError: there is no such number, or the present numbers are not those of the system (default: that of
                 the model).
         """
-        declared, sensing, n = self._declared(system), self._sensing, self._layout.n_q
-        direction = self._direction(name, path, declared)
-        self._check_written(f"{declared.system.element(name).kind} '{name}': '{path}'", direction, declared)
+        sensing, n = self._sensing, self._layout.n_q
+        direction = self.direction(name, path, system)
         w = self._derivatives.put(point)
         dynamics, ptr = sensing.dynamics.values, sensing.dynamics.values.par_ptr
         analytic, rest = np.zeros(n + 7), direction.dynamics.copy()

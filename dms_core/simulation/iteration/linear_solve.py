@@ -2,7 +2,7 @@
 
 from dms_core.compiled.arena import fields, indices, inner, naturals, number
 from dms_core.compiled.jit import compiled
-from dms_core.linear.lu import factor, solve
+from dms_core.linear.lu import factor, solve, solve_transposed
 from dms_core.linear.symbolic import LuTables
 
 LU = fields(LuTables)
@@ -29,3 +29,9 @@ def factorise(model, system, values, work):
 def back_substitute(model, system, values, b, x, work):
     """x from the factors in `values`."""
     solve(lu_tables(inner(model, system)), values, b, x, work)
+
+
+@compiled
+def back_substitute_transposed(model, system, values, b, x, work):
+    """x of the transposed system from the factors in `values`."""
+    solve_transposed(lu_tables(inner(model, system)), values, b, x, work)

@@ -17,7 +17,7 @@ from dms_core.simulation.state import CLOCK, STATE
 
 
 @compiled
-def _prepare_bdf2(s, h, h1):
+def prepare_bdf2(s, h, h1):
     """Constants cq, cv of the step; its guess, the quadratic through y_n, y_(n-1) and ydot_n, which carries y_(n-2)."""
     q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
     q_before, v_before = floats(s, STATE.q_before), floats(s, STATE.v_before)
@@ -38,7 +38,7 @@ def bdf2_step(m, s, o, h):
     clock = floats(s, STATE.clock)
     h1, h2 = clock[CLOCK.h_before], clock[CLOCK.h_before2]
     ratio = h / h1
-    _prepare_bdf2(s, h, h1)
+    prepare_bdf2(s, h, h1)
     code, iterations = run_stage(m, s, o, clock[CLOCK.t] + h, (1.0 + 2.0 * ratio) / (1.0 + ratio) / h, ratio, True)
     if code != NEWTON.converged:
         return code, iterations, 0.0

@@ -20,7 +20,7 @@ SDIRK_ERROR = 0.0404
 
 
 @compiled
-def _prepare_first_stage(s, h, c0):
+def prepare_first_stage(s, h, c0):
     """Constants and guess of the stage at GAMMA h."""
     q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
     cq, cv = floats(s, STATE.cq), floats(s, STATE.cv)
@@ -31,7 +31,7 @@ def _prepare_first_stage(s, h, c0):
 
 
 @compiled
-def _prepare_second_stage(s, h, c0):
+def prepare_second_stage(s, h, c0):
     """Rates of the first stage; constants and guess of the one at h."""
     w = inner(s, STATE.w)
     q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
@@ -49,11 +49,11 @@ def _prepare_second_stage(s, h, c0):
 def sdirk2_step(m, s, o, h):
     """One SDIRK2 step of size h into w. Gives (code, iterations, weighted local error)."""
     t, c0 = floats(s, STATE.clock)[CLOCK.t], 1.0 / (GAMMA * h)
-    _prepare_first_stage(s, h, c0)
+    prepare_first_stage(s, h, c0)
     code, first = run_stage(m, s, o, t + GAMMA * h, c0, 0.0, False)
     if code != NEWTON.converged:
         return code, first, 0.0
-    _prepare_second_stage(s, h, c0)
+    prepare_second_stage(s, h, c0)
     code, second = run_stage(m, s, o, t + h, c0, 0.0, True)
     if code != NEWTON.converged:
         return code, first + second, 0.0
