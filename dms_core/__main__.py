@@ -7,6 +7,8 @@ python -m dms_core static MODEL.yaml --out FILE.csv [--loads NAME ...] [--steps 
 python -m dms_core kinematic MODEL.yaml --t-end T --sample DT --out FILE.csv
 python -m dms_core inverse MODEL.yaml --motion FILE.csv --out FILE.csv [--muscles FILE.csv]
 python -m dms_core modes MODEL.yaml --out FILE.csv [--matrices FILE.json] [--pictures FILE.png]
+python -m dms_core estimate MODEL.yaml --measurements FILE.csv --settings FILE.yaml --out FILE.csv [--smooth]
+python -m dms_core observability MODEL.yaml --sensors NAME ... --out FILE.csv [--settings FILE.yaml]
 python -m dms_core schema [--out FILE] [--overwrite]
 """
 
@@ -29,6 +31,8 @@ from dms_core.analyses.commands.modes import modes
 from dms_core.analyses.commands.static import static
 from dms_core.command_line import FAILED_RUN, FileOut, bar_of_run, moves, run_command
 from dms_core.errors import InputError, Stopped
+from dms_core.estimation.commands.estimate import estimate_command
+from dms_core.estimation.commands.observability import observability
 from dms_core.files.output_file import check_columns, check_size, write_csv, write_json, write_text
 from dms_core.files.output_place import descriptor
 from dms_core.files.outputs import Outputs, partial
@@ -216,6 +220,8 @@ def main(arguments: list[str] | None = None) -> int:
             "inverse": inverse,
             "modes": modes,
             "sensitivity": sensitivity,
+            "estimate": estimate_command,
+            "observability": observability,
             "schema": schema,
         },
         "python -m dms_core",

@@ -178,3 +178,12 @@ def pick(chart, c, k, x):
         x[i], x[n_z + i] = dq[k, chosen[i]], dv[k, chosen[i]]
     for i in range(first.shape[0]):
         x[2 * n_z + i] = dq[k, first[i]]
+
+
+@compiled
+def solve_square(chart):
+    """The square system of the last `lift`, with `side` as right-hand side, which becomes the solution.
+
+    Its first rows are those of phi_q over `sizes`, its last ones pick the chosen coordinates.
+    """
+    _solve(matrix(chart, CHART.square), ints(chart, CHART.order), floats(chart, CHART.side))

@@ -20,7 +20,9 @@ ABOVE = {
     "model": {"linear", "assembly", "simulation", "analyses"},
     "assembly": {"simulation", "analyses"},
     "compiled": {"simulation", "linear", "analyses"},
-    "simulation": {"analyses"},
+    "simulation": {"analyses", "estimation"},
+    "analyses": {"estimation"},
+    "sensitivity": {"estimation"},
     "files": {"compiled", "linear", "model", "assembly", "simulation", "analyses"},
 }
 """What a folder must not import."""

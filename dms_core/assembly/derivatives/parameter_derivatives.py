@@ -14,6 +14,7 @@ dpar/dp, which may depend on them, cannot be had from it: the system that declar
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -274,3 +275,35 @@ def _numbers(calls: list) -> np.ndarray:
 def _with(calls: Calls, change: np.ndarray) -> Calls:
     """The same calls with other numbers."""
     return calls._replace(par=calls.par + change)
+
+
+def declared_number(system: System, name: str, path: str) -> float:
+    """The number that a declaration holds at a path of keys and places, such as 'mass' or 'inertia.2'.
+
+    Raises:
+        InputError: there is none; names what is there.
+    """
+    element = system.element(name)
+    return _number(f"{element.kind} '{name}'", element, path.split("."))
+
+
+def numbers_with(layout: Layout, values: Mapping[tuple[str, str], float]) -> tuple[np.ndarray, ...]:
+    """Numbers of dynamics, constraints and sensors, with other values of declared numbers.
+
+    They are what may be written into `Model.numbers` of the layout's model.
+
+    Args:
+        layout: of the declared system.
+        values: by name of the element and path of the number.
+
+    Raises:
+        InputError: there is no such number, or with that value elements are joined otherwise.
+    """
+    system = layout.system
+    for (name, path), value in values.items():
+        change = value - declared_number(system, name, path)
+        system = _system_with(system, _moved(system.element(name), path.split("."), change))
+    there = Layout(system)
+    if not same_structure(there, layout):
+        raise InputError(f"{choices(f'{n}.{p}' for n, p in values)} cannot be moved alone: the structure changes.")
+    return tuple(_numbers(calls) for calls in (there.dynamics, there.constraints, there.sensors))

@@ -1,0 +1,1 @@
+"""Commands of state estimation."""
