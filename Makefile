@@ -120,7 +120,7 @@ docs: $(STAMP)
 	$(BIN)/python -m dms_core schema --out docs/model-files.md --overwrite
 	$(BIN)/python -m exo_env scenarios --out $(OUT)/scenarios
 	cp $(OUT)/scenarios/fig12_joint_moments.png docs/scenarios.png
-	$(BIN)/python -m agents picture --policy none adaptive_gravity learned oracle --patient stroke_severe --seed 3 \
+	$(BIN)/python -m agents picture --policy none mean_angle learned oracle --patient stroke_severe --seed 3 \
 	    --out docs/hidden-intent.png --overwrite
 
 clean:

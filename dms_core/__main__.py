@@ -36,9 +36,10 @@ from dms_core.estimation.commands.observability import observability
 from dms_core.files.output_file import check_columns, check_size, write_csv, write_json, write_text
 from dms_core.files.output_place import descriptor
 from dms_core.files.outputs import Outputs, partial
-from dms_core.model_tables import columns, compiled, heads
+from dms_core.model_files.model_tables import columns, compiled, heads
+from dms_core.model_files.schema import reference
 from dms_core.results import Result
-from dms_core.schema import reference
+from dms_core.sensitivity.command import sensitivity
 from dms_core.simulation.dynamics import new_simulation
 from dms_core.simulation.events import Crossing
 from dms_core.simulation.options import MethodName
@@ -218,6 +219,7 @@ def main(arguments: list[str] | None = None) -> int:
             "kinematic": kinematic,
             "inverse": inverse,
             "modes": modes,
+            "sensitivity": sensitivity,
             "estimate": estimate_command,
             "observability": observability,
             "schema": schema,

@@ -17,7 +17,7 @@ A first run compiles in two processes: `compile_beside_models("module:function")
 names a function without arguments that compiles what the package builds on a world.
 """
 
-from dms_core.assembly.sensing import read_sensors
+from dms_core.assembly.readings.sensing import read_sensors
 from dms_core.assembly.tables import MODEL, SIGNALS
 from dms_core.compiled.arena import (
     Packed,
@@ -35,8 +35,8 @@ from dms_core.compiled.arena import (
 from dms_core.compiled.calls import TABLE, TABLE_CALL, address, call_with_table
 from dms_core.compiled.jit import compiled
 from dms_core.compiled.side_by_side import register as compile_beside_models
-from dms_core.simulation.newton import largest_errors
-from dms_core.simulation.parts import PARTS, advance, restart, run_part
+from dms_core.simulation.iteration.newton import largest_errors
+from dms_core.simulation.iteration.parts import PARTS, advance, restart, run_part
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, Options, renumber, rewind
 from dms_core.simulation.step_control import OUTCOME
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals
-from dms_core.dense_output import Rates, cubic, quintic
 from dms_core.errors import DmsError, InputError, SimulationError, choices
+from dms_core.files.memory import check_memory
 from dms_core.flags import Flag, Limits, input_values
-from dms_core.memory import check_memory
+from dms_core.simulation.dense_output import Rates, cubic, quintic
 
 
 class Result(Enum):

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from dms_core.config_files import config_file
 from dms_core.errors import InputError
+from dms_core.files.config_files import config_file
 from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import Checked, plain, shown
 

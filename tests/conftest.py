@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 ROOT = configs().parent
 

@@ -9,7 +9,7 @@ MOST = 12
 """Modules of a folder beside its `__init__`."""
 
 
-@pytest.mark.parametrize("package", ["exo_env", "agents"])
+@pytest.mark.parametrize("package", ["dms_core", "exo_env", "agents"])
 def test_no_folder_has_more_than_a_dozen_modules(package):
     folders = [path for path in (ROOT / package).rglob("*") if (path / "__init__.py").exists()]
     assert folders

@@ -6,12 +6,12 @@ import os
 import subprocess
 from pathlib import Path
 
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 SCRIPT = """
 import dms_core, sys
-from dms_core.config_files import config_file, configs
-from dms_core.model_file import load
+from dms_core.files.config_files import config_file, configs
+from dms_core.model_files.model_file import load
 print(dms_core.__file__)
 print(sorted(str(p.relative_to(configs())) for p in configs().rglob("*.yaml")))
 print(load(config_file("models/pendulum.yaml")).name)

@@ -17,8 +17,8 @@ import gymnasium
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, FailFast, Field
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError, ModelWarning, choices
+from dms_core.files.config_files import configs
 from dms_core.files.input_file import read_bytes
 from dms_core.files.json_text import Each, brief, checked, finite, read_json
 from dms_core.files.output_file import write_bytes, write_text

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from dms_core.files.json_text import brief
 from dms_core.files.yaml_text import read_yaml
 

@@ -1,8 +1,8 @@
 """Elements that an analysis without rates of element states cannot have: those that drive inputs, and those that read.
 
-Readings of sensors and driven inputs are rates of own coordinates (dms_core.assembly.connections). At rest all rates
-are 0, and in a kinematic simulation those of all element states are: each reading, and each input that such an element
-drives, would count as 0, whatever it is.
+Readings of sensors and driven inputs are rates of own coordinates (dms_core.assembly.pattern.connections). At rest all
+rates are 0, and in a kinematic simulation those of all element states are: each reading, and each input that such an
+element drives, would count as 0, whatever it is.
 """
 
 from __future__ import annotations

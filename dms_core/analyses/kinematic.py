@@ -18,14 +18,14 @@ import numpy as np
 
 from dms_core.analyses.driven_inputs import check_drives_nothing
 from dms_core.analyses.motion_names import motion_in_words
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, ModelError, SimulationError, choices
+from dms_core.files.memory import check_memory
 from dms_core.flags import Flag, Limits, input_values
 from dms_core.linear.rank import independent_rows
-from dms_core.memory import check_memory
 from dms_core.model.system import System
 from dms_core.results import States
 

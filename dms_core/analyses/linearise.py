@@ -27,10 +27,12 @@ import numpy as np
 
 from dms_core.analyses.independent import Independent, independent
 from dms_core.analyses.motion_names import motion_in_words
-from dms_core.assembly.blocks import Blocks, OperatingPoint
-from dms_core.assembly.input_derivatives import STEP
+from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
+from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError
+from dms_core.results import Result
+from dms_core.simulation.dynamics import World
 
 GROWS = 1e-6
 """Real part over the largest |eigenvalue| above which a motion counts as growing: a double 0, as of a body that drifts,
@@ -150,14 +152,19 @@ class Linearisation:
 
 
 def linearise(
-    model: Model, point: OperatingPoint, *, held: Sequence[int] | np.ndarray = (), blocks: Blocks | None = None
+    model: Model | World,
+    point: OperatingPoint | None = None,
+    *,
+    held: Sequence[int] | np.ndarray = (),
+    blocks: Blocks | None = None,
 ) -> Linearisation:
-    """Linear system about a state of the model.
+    """Linear system about a state of the model, or about the present state of a world.
 
     Args:
-        model: a compiled model.
+        model: a compiled model; or a world, which is settled and taken as it is then: its accelerations and multipliers
+            become those that belong to its state and inputs.
         point: a state that satisfies the equations, as `World.operating_point` (behind `settle`) or
-            `Equilibrium.point` give it.
+            `Equilibrium.point` give it; with a model, and with a model only.
         held: coordinates of second order that are no states (an integral that moves nothing).
         blocks: equations there; default: the model's own, under the whole load.
 
@@ -167,11 +174,11 @@ def linearise(
         SimulationError: no accelerations belong to the state: a motion without inertia.
 
     Example:
-        >>> world = World(model)
-        >>> world.settle()
-        >>> linear = linearise(model, world.operating_point())
+        >>> linear = linearise(World(model))
         >>> linear.states, linear.eigenvalues
     """
+    if isinstance(model, World) or point is None:
+        model, point = _settled(model, point)
     b = model.derivatives.blocks(point) if blocks is None else blocks
     _check_state(model, point, b)
     G = b.phi_q.toarray()
@@ -181,8 +188,8 @@ def linearise(
     n_z, n_f, n_u = len(at.chosen), len(at.first), len(model.layout.input_index)
     n_x = 2 * n_z + n_f
     # Columns: x, then value, rate and second derivative of each input.
-    dq, dv = _displacements(model, b, at, n_x, n_u)
-    rates = _rates(model, point, b, at, dq, dv)
+    dq, dv = displacements(model, b, at, n_x, n_u)
+    rates = rates_of(model, point, b, at, dq, dv)
     dx = np.zeros((n_x, n_x + 3 * n_u))
     dx[:n_z] = dv[at.chosen]
     dx[n_z : 2 * n_z] = rates.a[at.chosen]
@@ -202,6 +209,22 @@ def linearise(
     )  # fmt: skip
 
 
+def _settled(world: Model | World, point: OperatingPoint | None) -> tuple[Model, OperatingPoint]:
+    """Model and state of a world.
+
+    Raises:
+        InputError: both a world and a point were given, or neither.
+        SimulationError: no accelerations belong to the state.
+    """
+    if not isinstance(world, World):
+        raise InputError("linearise: Expected an operating point with a model, or a world alone, got a model alone.")
+    if point is not None:
+        raise InputError("linearise: Expected a world alone, or a model with an operating point, got both.")
+    if world.settle() is not Result.SUCCESS:
+        raise SimulationError(f"the system cannot be linearised: {world.result.value}")
+    return world.model, world.operating_point(behind=True)
+
+
 @dataclass(frozen=True)
 class _Rates:
     """Derivatives of v (with first-order rates), vdot and lam by the columns."""
@@ -217,8 +240,8 @@ def _by_inputs(block: np.ndarray, n_x: int) -> np.ndarray:
     return np.concatenate([np.zeros((len(block), n_x)), columns], axis=1)
 
 
-def _displacements(model: Model, b: Blocks, at: Independent, n_x: int, n_u: int) -> tuple[np.ndarray, np.ndarray]:
-    """dq and dv (first-order rates left out) of each column."""
+def displacements(model: Model, b: Blocks, at: Independent, n_x: int, n_u: int) -> tuple[np.ndarray, np.ndarray]:
+    """dq and dv (first-order rates left out) of each column: n_x states, then n_u inputs, each by three derivatives."""
     n_z, rows = len(at.chosen), at.rows
     dq, dv = np.zeros((model.n_q, n_x + 3 * n_u)), np.zeros((model.n_q, n_x + 3 * n_u))
     dq[:, :n_z] = at.N
@@ -229,9 +252,13 @@ def _displacements(model: Model, b: Blocks, at: Independent, n_x: int, n_u: int)
     return dq, dv
 
 
-def _rates(model: Model, point: OperatingPoint, b: Blocks, at: Independent, dq: np.ndarray, dv: np.ndarray) -> _Rates:
-    """Accelerations, first-order rates and multipliers of each column."""
-    n_s, rows, n_x = len(at.second), at.rows, dq.shape[1] - 3 * len(model.layout.input_index)
+def rates_of(
+    model: Model, point: OperatingPoint, b: Blocks, at: Independent, dq: np.ndarray, dv: np.ndarray,
+    more: np.ndarray | None = None,
+) -> _Rates:  # fmt: skip
+    """Accelerations, first-order rates and multipliers of each column; `more` is added to the acceleration rows."""
+    n_u = b.r2_u.shape[1]
+    n_s, rows, n_x = len(at.second), at.rows, dq.shape[1] - 3 * n_u
     G, M, C = b.phi_q.toarray()[rows], b.r2_a.toarray(), b.r2_v.toarray()
     unknown = np.concatenate([M[:, at.second], C[:, at.first], G.T], axis=1)
     bound = np.zeros((len(rows), unknown.shape[1]))
@@ -240,12 +267,13 @@ def _rates(model: Model, point: OperatingPoint, b: Blocks, at: Independent, dq: 
     open_force = b.r2_q.toarray() @ dq + C @ dv + _by_inputs(b.r2_u, n_x)
     second = _by_inputs(b.r4_u, n_x)[rows]
     # phi_tt of additive inputs: s_u uddot + 2 (s_u udot)_u udot.
-    n_u = len(model.layout.input_index)
     by_acceleration = np.zeros_like(second)
     by_acceleration[:, n_x + 2 * n_u :] = second[:, n_x + n_u : n_x + 2 * n_u]
     by_acceleration[:, n_x + n_u : n_x + 2 * n_u] = 2.0 * second[:, n_x : n_x + n_u]
     W_a = model.constraint_jacobian(point.q, point.a)[3][rows]
     bend = W_a @ dq + 2.0 * b.r4_q.toarray()[rows] @ dv + _third(model, point, dq)[rows] + by_acceleration
+    if more is not None:
+        bend += more[rows]
     try:
         found = np.linalg.solve(left, -np.vstack([open_force, bend]))
     except np.linalg.LinAlgError:

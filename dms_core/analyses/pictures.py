@@ -170,7 +170,7 @@ def _draw(ax: Any, linear: Linearisation, mode: Mode) -> None:
         _stroke(ax, lines(model, moved), axes, colour, depth)
     _stroke(ax, rest, axes, REST, 1)
     swing = f"{mode.damped_frequency:.3g} Hz" if mode.damped_frequency else f"{mode.time_constant:.3g} s"
-    ax.set_title(f"{swing}, damping ratio {mode.damping:.3g}", fontsize=9)
+    ax.set_title(f"{swing}\ndamping ratio {mode.damping:.3g}", fontsize=9)
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.margins(0.08)

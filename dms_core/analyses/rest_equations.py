@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.analyses.driven_inputs import check_drives_nothing, check_reads_nothing
-from dms_core.assembly.blocks import Blocks, OperatingPoint
-from dms_core.assembly.input_derivatives import STEP
+from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
+from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.assembly.layout import Call
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, ModelError, ModelWarning, choices

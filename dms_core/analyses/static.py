@@ -23,7 +23,7 @@ from dms_core.analyses.independent import basis
 from dms_core.analyses.linearise import Linearisation, linearise
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.analyses.rest_equations import RestBlocks, RestEquations
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError
 from dms_core.flags import Flag, Limits

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dms_core.assembly.connections import connected, driven_inputs
+from dms_core.assembly.pattern.connections import connected, driven_inputs
 from dms_core.errors import ModelError, choices
 from dms_core.model.element import GROUND, Constraint, Coordinate, DynamicElement, Placement, Sensor
 from dms_core.model.system import System
@@ -36,6 +36,12 @@ class Call:
     """Number of constraint rows or of sensor components."""
     sensor: Sensor | None = None
     """Dynamic calls only: the sensor whose kernel this call is for, see connections.py."""
+
+    @property
+    def law(self) -> tuple[str, ...]:
+        """What is evaluated, and of what, by names: those of classes, without the module, which may move."""
+        classes = [f"{x.kind} {type(x).__qualname__}" for x in (self.element, self.sensor) if x is not None]
+        return (*classes, self.placement.constraint, *self.placement.sources)
 
 
 class Layout:
@@ -84,13 +90,9 @@ class Layout:
 
     @cached_property
     def digest(self) -> str:
-        """Equal where `same_structure` holds, in this process or another; classes are known by their names."""
+        """Equal where `same_structure` holds, in this process or another."""
         calls = [*self.dynamics, *self.constraints, *self.sensors]
-        parts = [
-            (f"{type(c.element).__module__}.{type(c.element).__qualname__}", c.iq.tolist(), c.iu.tolist(),
-             list(c.placement.integers))
-            for c in calls
-        ]  # fmt: skip
+        parts = [(c.law, c.iq.tolist(), c.iu.tolist(), list(c.placement.integers)) for c in calls]
         counts = [len(x) for x in (self.dynamics, self.constraints, self.sensors)]
         everything = (self.names, self.row_names, self.outputs, sorted(self.input_index.items()), counts, parts)
         return hashlib.sha256(repr(everything).encode()).hexdigest()
@@ -174,6 +176,7 @@ def _same_call(one: Call, other: Call) -> bool:
     """True if two calls differ in their numbers at most."""
     return (
         type(one.element) is type(other.element)
+        and one.law == other.law
         and np.array_equal(one.iq, other.iq)
         and np.array_equal(one.iu, other.iu)
         and tuple(one.placement.integers) == tuple(other.placement.integers)

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from dms_core.assembly.blocks import Derivatives
-from dms_core.assembly.elimination import Welds, find_welds, recover
-from dms_core.assembly.finite import check_finite, naming_far_numbers, open_call
+from dms_core.assembly.derivatives.blocks import Derivatives
+from dms_core.assembly.derivatives.finite import check_finite, naming_far_numbers, open_call
+from dms_core.assembly.derivatives.parameter_derivatives import ParameterDerivatives
 from dms_core.assembly.layout import Call, Layout, same_structure
-from dms_core.assembly.linear_systems import (
+from dms_core.assembly.pattern.elimination import Welds, find_welds, recover
+from dms_core.assembly.pattern.linear_systems import (
     FROM_THE_START,
     HERE_AND_NOW,
     TYPICAL_C0,
@@ -22,11 +23,10 @@ from dms_core.assembly.linear_systems import (
     nominal_sizes,
     ordered_systems,
 )
-from dms_core.assembly.order_code import ORDER_CODE
-from dms_core.assembly.parameter_derivatives import ParameterDerivatives
+from dms_core.assembly.pattern.order_code import ORDER_CODE
+from dms_core.assembly.pattern.sparse_constraints import SparseConstraints
+from dms_core.assembly.readings.sensing import SENSING_CODE, composition, measure, new_sensing
 from dms_core.assembly.residual import dense_constraints, dense_jacobians, evaluate_inputs, evaluate_rates
-from dms_core.assembly.sensing import SENSING_CODE, composition, measure, new_sensing
-from dms_core.assembly.sparse_constraints import SparseConstraints
 from dms_core.assembly.start import Start, assemble
 from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tables
 from dms_core.compiled import side_by_side

@@ -3,7 +3,7 @@
 Indices are read as unsigned: that spares the loops numba's test for negative ones.
 """
 
-from dms_core.assembly.sparsity import BlockPattern, NewtonPattern, Part, RatePattern
+from dms_core.assembly.pattern.sparsity import BlockPattern, NewtonPattern, Part, RatePattern
 from dms_core.assembly.tables import WORK
 from dms_core.compiled.arena import fields, indices, inner, ints, matrix, naturals
 from dms_core.compiled.jit import compiled

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dms_core.assembly.layout import Layout
-from dms_core.assembly.sparsity import NewtonPattern, RatePattern
+from dms_core.assembly.pattern.sparsity import NewtonPattern, RatePattern
 from dms_core.compiled.arena import fields
 from dms_core.compiled.calls import SIGNAL, address
 from dms_core.errors import InputError

@@ -1,4 +1,4 @@
-"""Entries of calls that read driven inputs or sensors; their tables are those of dms_core.assembly.connections.
+"""Entries of calls that read driven inputs or sensors; their tables are those of dms_core.assembly.pattern.connections.
 
 `_kernel` and `_second` are put into the globals of each entry (entries.py): the element's or sensor's kernel, and the
 element's `input_kernel`.

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from dms_core.assembly.derivatives.parameter_derivatives import declared_number, numbers_with
 from dms_core.assembly.model import Model
-from dms_core.assembly.parameter_derivatives import declared_number, numbers_with
 from dms_core.errors import InputError, SimulationError, choices
 from dms_core.model.signals import Constant
 from dms_core.results import Result

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.analyses.linearise import Linearisation, linearise
-from dms_core.assembly.input_derivatives import STEP
+from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.errors import SimulationError
 from dms_core.estimation.charts import Chart, chart_at
 from dms_core.estimation.nominal_world import FINER, NominalWorld

@@ -178,7 +178,7 @@ class Placement:
     """Dynamic elements only: a sensor component by its full name. This is then no call of the element's kernel, but the
     row v - y = 0 of its one coordinate, an own first-order one: its rate is the reading."""
     wired: bool = False
-    """Set where an input that the call reads is driven by an element (dms_core.assembly.connections)."""
+    """Set where an input that the call reads is driven by an element (dms_core.assembly.pattern.connections)."""
 
     @property
     def size(self) -> int:

@@ -14,8 +14,8 @@ for by repeated solves, x <- A^-1 (b + (phi_q^T mu)_q x), each of which gains th
 
 import math
 
-from dms_core.assembly.blocks import scatter_projection
-from dms_core.assembly.input_derivatives import constraint_by_input, dynamic_by_input
+from dms_core.assembly.derivatives.blocks import scatter_projection
+from dms_core.assembly.derivatives.input_derivatives import constraint_by_input, dynamic_by_input
 from dms_core.assembly.local import (
     add_constraint_forces,
     add_dynamic_rows,
@@ -30,18 +30,18 @@ from dms_core.assembly.tables import CALLS, MODEL, WORK
 from dms_core.compiled.arena import floats, indices, inner, ints, matrix, naturals, table_at
 from dms_core.compiled.entries import SLOPES
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.tables import DIFFERENTIALS, MOVEMENT, Movement
+from dms_core.sensitivity.tables import DIFFERENTIALS, MOVEMENT, NUMBERS, Movement
 from dms_core.sensitivity.tables import STAGE as AT
-from dms_core.simulation.implicit_stage import LOCAL_SHARE
-from dms_core.simulation.linear_solve import back_substitute, factorise
-from dms_core.simulation.newton import apply, correction_norm, right_hand_side
-from dms_core.simulation.parts import SINGULAR_PIVOT
-from dms_core.simulation.state import STATE
+from dms_core.simulation.iteration.implicit_stage import LOCAL_SHARE
+from dms_core.simulation.iteration.linear_solve import back_substitute, factorise
+from dms_core.simulation.iteration.newton import apply, correction, correction_norm, right_hand_side
+from dms_core.simulation.iteration.parts import PARTS, SINGULAR_PIVOT, run_part
+from dms_core.simulation.state import STATE, begin_matrix
 
 PASSES = 4
-CLOSE = 1e-8
-"""Relative distance to the converged stage up to which its matrix is taken there: a correction with it leaves the
-square of that, and derivatives err by about as much."""
+POLISHINGS = 6
+STALLED = 0.1
+"""Share of the correction before above which one is rounding."""
 LEFT = 1e-14
 """Share of a solution that repeated solves leave of what the Newton matrix lacks."""
 MOST_SWEEPS = 12
@@ -149,6 +149,30 @@ def _by_numbers(s, d, g):
 
 
 @compiled
+def _polish(m, s, c0, close):
+    """Corrections with the matrix at hand until they are smaller than `close`, or no longer shrink."""
+    before = math.inf
+    for _ in range(POLISHINGS):
+        run_part(m, s, PARTS.residual)
+        norm = correction(m, s, c0)
+        if not norm < before:
+            return
+        apply(m, s, c0, floats(s, STATE.x), 1.0)
+        if norm < close or norm > STALLED * before:
+            return
+        before = norm
+
+
+@compiled
+def _keep_factors(s, values, c0):
+    """The factors of this stage serve the next one's iteration."""
+    kept = floats(s, STATE.newton_values)
+    for i in range(kept.shape[0]):
+        kept[i] = values[i]
+    begin_matrix(s, c0)
+
+
+@compiled
 def differentiate_stage(m, s, o, d, g, c0):
     """Bring the stage in w to its converged point and differentiate it there; False where its matrix is singular.
 
@@ -156,6 +180,8 @@ def differentiate_stage(m, s, o, d, g, c0):
     """
     values, work = floats(g, AT.factors), floats(d, DIFFERENTIALS.work)
     b, x = floats(s, STATE.b), floats(s, STATE.x)
+    close, before = floats(d, DIFFERENTIALS.numbers)[NUMBERS.close] / (LOCAL_SHARE * o.rtol), math.inf
+    _polish(m, s, c0, close)
     for _ in range(PASSES):
         evaluate_stage(m, s, d, g, c0)
         if not factorise(m, MODEL.newton_lu, values, work) > SINGULAR_PIVOT:
@@ -166,8 +192,10 @@ def differentiate_stage(m, s, o, d, g, c0):
         if not norm < math.inf:
             return False
         apply(m, s, c0, x, 1.0)
-        if norm * LOCAL_SHARE * o.rtol < CLOSE:
+        if norm < close or norm > STALLED * before:
             break
+        before = norm
+    _keep_factors(s, values, c0)
     _count_sweeps(d, g, c0)
     _by_inputs(m, s, d, g)
     _by_numbers(s, d, g)

@@ -12,8 +12,8 @@ from dms_core.sensitivity.chart import Chart, lift, new_chart
 from dms_core.sensitivity.steps import carry_forward, differentiated_step
 from dms_core.sensitivity.tables import KIND, Columns, new_columns, new_differentials
 from dms_core.simulation.dynamics import World
+from dms_core.simulation.iteration.parts import restart
 from dms_core.simulation.options import is_positive
-from dms_core.simulation.parts import restart
 from dms_core.simulation.state import COUNTS
 
 

@@ -17,11 +17,11 @@ from dms_core.compiled.jit import compiled
 from dms_core.sensitivity.stage import differentiate_stage
 from dms_core.sensitivity.stage_solve import column_forward, output_back
 from dms_core.sensitivity.tables import ADJOINTS, COLUMNS, DIFFERENTIALS, KIND, NUMBERS
-from dms_core.simulation.bdf2 import prepare_bdf2
-from dms_core.simulation.implicit_stage import set_weights
-from dms_core.simulation.newton import NEWTON
-from dms_core.simulation.parts import run_stage
-from dms_core.simulation.sdirk2 import GAMMA, prepare_first_stage, prepare_second_stage
+from dms_core.simulation.iteration.implicit_stage import set_weights
+from dms_core.simulation.iteration.newton import NEWTON
+from dms_core.simulation.iteration.parts import run_stage
+from dms_core.simulation.methods.bdf2 import prepare_bdf2
+from dms_core.simulation.methods.sdirk2 import GAMMA, prepare_first_stage, prepare_second_stage
 from dms_core.simulation.state import CLOCK, STATE
 from dms_core.simulation.step_control import accept
 

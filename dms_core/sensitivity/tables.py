@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dms_core.assembly.derivatives.parameter_derivatives import Direction
 from dms_core.assembly.model import Model
-from dms_core.assembly.parameter_derivatives import Direction
-from dms_core.assembly.sparsity import BlockPattern, block_pattern
+from dms_core.assembly.pattern.sparsity import BlockPattern, block_pattern
 from dms_core.assembly.tables import Calls, Tables, Work
 from dms_core.compiled.arena import Packed, fields
 from dms_core.compiled.entries import Slopes
@@ -49,6 +49,9 @@ class Numbers(NamedTuple):
     by_q: int
     """BDF2: cq by q_n and by q_(n-1)."""
     by_before: int
+    close: int
+    """Relative distance to a converged stage up to which a matrix is taken there. A correction with it leaves the
+    square of that; derivatives err by about as much."""
 
 
 class Kind(NamedTuple):
@@ -164,7 +167,13 @@ def new_movement(tables: Tables, direction: Direction) -> Packed:
     ))  # fmt: skip
 
 
-def new_differentials(model: Model, tables: Tables, work: Work, movements: Sequence[Packed] = ()) -> Packed:
+CLOSE, CLOSEST = 1e-8, 1e-12
+"""`Numbers.close` for single steps, and for whole runs, along which the errors of thousands of steps add up."""
+
+
+def new_differentials(
+    model: Model, tables: Tables, work: Work, movements: Sequence[Packed] = (), close: float = CLOSE
+) -> Packed:
     """Packed Differentials of one world: for the rows and orders of its tables, with the local arrays of its Work.
 
     Args:
@@ -172,6 +181,7 @@ def new_differentials(model: Model, tables: Tables, work: Work, movements: Seque
         tables: those that the world is solved with.
         work: work arrays of the world's state, `State.w`.
         movements: declared numbers, packed Movements; they must be kept alive.
+        close: see `Numbers.close`.
     """
     pattern, slots = block_pattern(model.layout)
     a, mu = slots["a"].coordinates(), slots["mu"].coordinates()
@@ -188,6 +198,8 @@ def new_differentials(model: Model, tables: Tables, work: Work, movements: Seque
         )  # fmt: skip
 
     rows, most = len(work.phi_l), max(k, len(work.phi_l))
+    numbers = np.zeros(len(NUMBERS))
+    numbers[NUMBERS.close] = close
     vectors = {name: np.zeros(size) for name in ("b", "r", "x")}
     return Packed(Differentials(
         pattern, a_rows=a[0], a_columns=a[1], mu_rows=mu[0], mu_columns=mu[1], kernels=known.kernels,
@@ -195,7 +207,7 @@ def new_differentials(model: Model, tables: Tables, work: Work, movements: Seque
         slopes=Slopes(work.q_l, work.v_l, work.a_l, work.u_l, np.zeros((local, 3 * k)), np.zeros((local, 1))),
         scratch=np.zeros((2 * rows + 4, most)),
         movements=np.array([p.table.ctypes.data for p in movements], np.int64), first=stage(), second=stage(),
-        numbers=np.zeros(len(NUMBERS)), **vectors, work=storage(lu.work_size), full=np.zeros(n), more=np.zeros(n),
+        numbers=numbers, **vectors, work=storage(lu.work_size), full=np.zeros(n), more=np.zeros(n),
     ))  # fmt: skip
 
 

@@ -15,13 +15,13 @@ from dms_core.flags import Flag, Limits
 from dms_core.model.signals import Constant
 from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
-from dms_core.simulation.addresses import part_addresses
 from dms_core.simulation.events import Crossing, advance_to_crossing
 from dms_core.simulation.failure import explain
+from dms_core.simulation.iteration.addresses import part_addresses
+from dms_core.simulation.iteration.parts import advance, restart
+from dms_core.simulation.iteration.rescue import HELPED, Place, Rescue
 from dms_core.simulation.options import SolverOptions, is_positive
-from dms_core.simulation.parts import advance, restart
 from dms_core.simulation.rates_between import rates_between
-from dms_core.simulation.rescue import HELPED, Place, Rescue
 from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
 from dms_core.simulation.snapshot import Mark, Snapshot, go_back, mark
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dms_core.assembly.finite import FAR, far_numbers, open_call, sentence
+from dms_core.assembly.derivatives.finite import FAR, far_numbers, open_call, sentence
+from dms_core.assembly.derivatives.wrong_derivatives import wrong_call
 from dms_core.assembly.model import Model
 from dms_core.assembly.start import joints_of, quoted
 from dms_core.assembly.tables import MODEL, Tables
-from dms_core.assembly.wrong_derivatives import wrong_call
 from dms_core.compiled.arena import Packed, inner
 from dms_core.linear.rank import degenerate_rows
 from dms_core.results import Result

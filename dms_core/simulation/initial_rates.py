@@ -14,7 +14,7 @@ import math
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import flags, floats, inner, ints, naturals, number
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.parts import PARTS, run_part
+from dms_core.simulation.iteration.parts import PARTS, run_part
 from dms_core.simulation.state import CLOCK, COUNTS, STATE, begin_matrix
 
 MAX_ITERATIONS = 60

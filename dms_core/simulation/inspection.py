@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dms_core.assembly.blocks import Blocks, OperatingPoint, SensorBlocks
+from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint, SensorBlocks
+from dms_core.assembly.derivatives.parameter_derivatives import ParameterBlocks
 from dms_core.assembly.model import Model
-from dms_core.assembly.parameter_derivatives import ParameterBlocks
 from dms_core.assembly.residual import evaluate_inputs
 from dms_core.compiled.arena import Packed, inner
 from dms_core.errors import ModelError, SimulationError
@@ -18,7 +18,7 @@ from dms_core.linear.null_space import null_space
 from dms_core.model.system import System
 from dms_core.results import Result
 from dms_core.simulation import snapshot
-from dms_core.simulation.newton_matrix import NewtonMatrix
+from dms_core.simulation.iteration.newton_matrix import NewtonMatrix
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.snapshot import Snapshot
 from dms_core.simulation.state import STATE, State

@@ -11,8 +11,8 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals
 from dms_core.compiled.arena import floats
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.addresses import part_addresses
-from dms_core.simulation.parts import PARTS, run_rates, set_inputs
+from dms_core.simulation.iteration.addresses import part_addresses
+from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
 from dms_core.simulation.state import STATE, new_state
 
 

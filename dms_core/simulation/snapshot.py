@@ -16,15 +16,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dms_core.assembly.model import Model
-from dms_core.assembly.sparsity import NewtonPattern, RatePattern
+from dms_core.assembly.pattern.sparsity import NewtonPattern, RatePattern
 from dms_core.assembly.tables import Signals, Tables
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError
 from dms_core.linear.lu import LuTables
 from dms_core.model.signals import Function
 from dms_core.results import Result
+from dms_core.simulation.methods.radau_state import NOT_USED
 from dms_core.simulation.options import SolverOptions
-from dms_core.simulation.radau_state import NOT_USED
 from dms_core.simulation.state import CLOCK, State, with_storage
 
 GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")

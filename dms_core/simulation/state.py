@@ -24,7 +24,7 @@ from dms_core.assembly.tables import WORK, Signals, Tables, Work
 from dms_core.compiled.arena import Packed, fields, floats, inner, ints
 from dms_core.compiled.jit import compiled
 from dms_core.linear.lu import storage
-from dms_core.simulation.radau_state import NOT_USED, new_radau_state
+from dms_core.simulation.methods.radau_state import NOT_USED, new_radau_state
 
 
 class Clock(NamedTuple):

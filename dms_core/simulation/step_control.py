@@ -14,14 +14,19 @@ from typing import NamedTuple
 from dms_core.assembly.tables import MODEL, SIGNALS, WORK
 from dms_core.compiled.arena import fields, flags, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.bdf2 import bdf2_step
-from dms_core.simulation.implicit_stage import set_weights
-from dms_core.simulation.newton import MAX_ITERATIONS, NEWTON, note_errors
-from dms_core.simulation.order_watch import may_be_singular, nearly_singular, ordered_for_another_size, pivots_weaken
-from dms_core.simulation.parts import PARTS, run_radau5, run_rates, set_inputs
-from dms_core.simulation.radau_constants import ORDER_OF_ERROR, REAL
-from dms_core.simulation.radau_state import CONTROL, RADAU
-from dms_core.simulation.sdirk2 import GAMMA, sdirk2_step
+from dms_core.simulation.iteration.implicit_stage import set_weights
+from dms_core.simulation.iteration.newton import MAX_ITERATIONS, NEWTON, note_errors
+from dms_core.simulation.iteration.order_watch import (
+    may_be_singular,
+    nearly_singular,
+    ordered_for_another_size,
+    pivots_weaken,
+)
+from dms_core.simulation.iteration.parts import PARTS, run_radau5, run_rates, set_inputs
+from dms_core.simulation.methods.bdf2 import bdf2_step
+from dms_core.simulation.methods.radau_constants import ORDER_OF_ERROR, REAL
+from dms_core.simulation.methods.radau_state import CONTROL, RADAU
+from dms_core.simulation.methods.sdirk2 import GAMMA, sdirk2_step
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, METHOD, STATE
 
 

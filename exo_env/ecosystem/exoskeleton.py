@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
-from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
+from dms_core.files.config_files import configs
 from dms_core.model.element import Vector
 from dms_core.model.geometry.rotations import dot, sub
 from dms_core.validation import shown

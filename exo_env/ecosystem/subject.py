@@ -21,8 +21,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, model_validator
 
-from dms_core.config_files import config_file, configs
 from dms_core.errors import InputError, choices
+from dms_core.files.config_files import config_file, configs
 from dms_core.files.input_file import decoded, read_bytes
 from dms_core.files.yaml_text import parse_yaml
 from dms_core.model import ThelenMuscle

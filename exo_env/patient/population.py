@@ -32,8 +32,8 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError, choices
+from dms_core.files.config_files import configs
 from dms_core.files.yaml_text import read_yaml
 from dms_core.validation import cut, shown
 from exo_env.ecosystem.person import SEXES

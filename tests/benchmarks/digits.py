@@ -26,7 +26,7 @@ import numpy as np
 
 from dms_core import Model, SolverOptions, World
 from dms_core.figures import drawn
-from exo_env.rendering.panels import COLOURS, legend, panels, save
+from exo_env.rendering.panels import COLOURS, legend, log_scale, panels, save
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.dms_core.literature.motions import MOTIONS
@@ -175,6 +175,7 @@ def draw(path: Path, rows: Sequence[Row]) -> None:
         ax.set(ylabel=label if j == 0 else "", title=name if work == "steps" else "")
         ax.set(xlabel="largest error [m, rad or -]" if work == "ms" else "")
         ax.grid(alpha=0.3)
+        log_scale(ax, "y")
     legend(figure, 4)
     save(figure, path)
 

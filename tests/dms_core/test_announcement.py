@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from dms_core.compiled.compilation import _Announcer
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 KERNELS = """
 from numba import njit

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 import dms_core.model
-from dms_core.config_files import config_file, configs
 from dms_core.errors import DmsError, InputError, ModelError
+from dms_core.files.config_files import config_file, configs
 from dms_core.files.yaml_text import read_yaml
 from dms_core.model import (
     Constant,
@@ -28,7 +28,7 @@ from dms_core.model import (
     ThelenCurves,
     ThelenMuscle,
 )
-from dms_core.model_file import BRANCHES, dump, kinds, load
+from dms_core.model_files.model_file import BRANCHES, dump, kinds, load
 from tests.example_elements import examples
 
 ROD = "bodies:\n  - {kind: rigid_body, name: rod, mass: 1.0, inertia: [0.1, 0.1, 0.1]}\n"

@@ -68,7 +68,7 @@ EXAMPLES = {
 }
 
 COMPOSITES = {
-    "joint_reaction": "tests/assembly/test_composite_sensors.py",
-    "joint_moment": "tests/assembly/test_composite_sensors.py",
+    "joint_reaction": "tests/dms_core/assembly/test_composite_sensors.py",
+    "joint_moment": "tests/dms_core/assembly/test_composite_sensors.py",
     "force_load": "tests/dms_core/assembly/test_force_loads.py",
 }

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from agents.environment import ENVIRONMENT
 from agents.training.settings.config import Config
-from dms_core.config_files import configs
 from dms_core.errors import DmsError
-from dms_core.model_file import load
+from dms_core.files.config_files import configs
+from dms_core.model_files.model_file import load
 from exo_env.ecosystem.exoskeleton import Exoskeleton
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.ecosystem.subject import read_subject

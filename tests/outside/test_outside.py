@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 CHECKOUT = configs().parent
 BLOCKED = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "pygame", "matplotlib", "imageio", "moviepy")

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dms_core.command_line import FAILED_RUN, FolderOut
-from dms_core.config_files import configs
 from dms_core.errors import printable
+from dms_core.files.config_files import configs
 from dms_core.files.output_file import write_text
 from dms_core.files.outputs import OutputFile, Outputs
 

@@ -14,8 +14,8 @@ from tqdm import tqdm
 from tyro.conf import arg
 
 from dms_core.command_line import STOPPED, FolderOut
-from dms_core.config_files import configs
 from dms_core.errors import InputError, Stopped
+from dms_core.files.config_files import configs
 
 from ...environment import PROGRAM, environment_id
 from ...evaluation.episodes.episode import judged

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 
 from ...environment import PROGRAM, hides_plan
 from ...policies.baselines import REFERENCE_FREE

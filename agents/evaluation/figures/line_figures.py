@@ -13,8 +13,8 @@ from exo_env.rendering.panels import COLOURS, DASHES, legend, literal, note, pan
 from ...policies.policy import Policy
 
 MARKERS = "osD^vP*X"
-COLUMNS = 4
-"""Panels in a row at most."""
+COLUMNS = (3, 4)
+"""Panels in a row, where there are more than four: as many as leave fewer places empty."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def draw_panels(
         whom: over whom the intervals are.
         sentences: on what is shown.
     """
-    columns = min(COLUMNS, len(shown))
+    columns = min(COLUMNS, key=lambda c: (-len(shown) % c, -c)) if len(shown) > max(COLUMNS) else len(shown)
     rows = -(-len(shown) // columns)
     figure, axes = panels(rows, columns, (max(3.3 * columns, 4.5), 2.9 * rows + 0.7))
     for ax, (across, up, curves) in zip(axes.flat, shown, strict=False):

@@ -69,23 +69,35 @@ def _cuff(plan: Plan, policy: Policy, times: float) -> Plan:
 
 def _noise(plan: Plan, policy: Policy, factor: float) -> Plan:
     """White noise and quanta are larger."""
-    return _faulty(plan, policy, lambda i: i.changed(deviation=factor * i.deviation, quantum=factor * i.quantum))
+    return _faulty(plan, policy, lambda i, scale: i.changed(deviation=factor * i.deviation, quantum=factor * i.quantum))
 
 
 def _delay(plan: Plan, policy: Policy, milliseconds: float) -> Plan:
     """Sensors are later."""
-    return _faulty(plan, policy, lambda i: i.changed(delay=i.delay + 1e-3 * milliseconds))
+    return _faulty(plan, policy, lambda i, scale: i.changed(delay=i.delay + 1e-3 * milliseconds))
 
 
-def _faulty(plan: Plan, policy: Policy, change: Callable[[Imperfection], Imperfection]) -> Plan:
-    """Changed imperfections of what sensors show the policy: not of its own action, nor of what none measures."""
+def _bias(plan: Plan, policy: Policy, part: float) -> Plan:
+    """Sensors show too much, by a part of the scale of their channel."""
+    return _faulty(plan, policy, lambda i, scale: i.changed(bias=i.bias + part * scale))
+
+
+def _faulty(plan: Plan, policy: Policy, change: Callable[[Imperfection, float], Imperfection]) -> Plan:
+    """Changed imperfections of what sensors show the policy: not of its own action, nor of what none measures.
+
+    Args:
+        plan: of the policy.
+        policy: whose observation counts.
+        change: new imperfection of a channel, from its own and its scale [unit of the channel].
+    """
     world: Any = make(plan.environment, action_mode=policy.action_mode, observation=list(policy.observation)).unwrapped
     shown = {
-        f"{group}.{channel.name}": channel.imperfection
+        f"{group}.{channel.name}": (channel.imperfection, channel.scale)
         for group, channel in world.observer.channels
         if group not in world.task.revealing and channel.name != action_channel().name
     }
-    noise = {name: change(one).model_dump() for name, one in shown.items() if change(one) != one}
+    changed = {name: (change(one, scale), one) for name, (one, scale) in shown.items()}
+    noise = {name: new.model_dump() for name, (new, one) in changed.items() if new != one}
     return _with(plan, noise=noise) if noise else plan
 
 
@@ -114,6 +126,7 @@ SHIFTS: Mapping[str, Shift] = {
     "cuff": Shift("compliance of the cuff, over a measured one; 0: rigid [-]", (0.0, 0.5, 1.0, 2.0, 4.0), _cuff),
     "sensor_noise": Shift("noise of the sensors, over that of training [-]", (1.0, 2.0, 4.0, 8.0, 16.0), _noise),
     "sensor_delay": Shift("delay of the sensors beyond training [ms]", (0.0, 20.0, 40.0, 80.0, 160.0), _delay),
+    "sensor_bias": Shift("bias of the sensors, over their scales [-]", (0.0, 0.025, 0.05, 0.1, 0.2), _bias),
     "electrode_faults": Shift(
         "faults of the electrodes, over those of training [-]", (1.0, 1.5, 2.0, 3.0), _electrodes
     ),

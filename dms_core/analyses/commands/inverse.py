@@ -21,7 +21,7 @@ from dms_core.model.constraints import Revolute, Slider
 from dms_core.model.sensors import JointAngle
 from dms_core.model.signals import AnySignal, Table
 from dms_core.model.system import System
-from dms_core.model_tables import compiled
+from dms_core.model_files.model_tables import compiled
 
 ENDINGS = ("", "_rad", "_deg", "_m", "_mm", ".angle", ".angle_rad", ".angle_deg")
 """What may stand behind the name of a joint or a sensor in the name of a column."""

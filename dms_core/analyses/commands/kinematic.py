@@ -16,7 +16,7 @@ from dms_core.errors import InputError
 from dms_core.files.output_file import check_columns, check_size, with_unit, write_csv, write_json
 from dms_core.files.outputs import Outputs
 from dms_core.model.constraints import AngleDriver
-from dms_core.model_tables import columns, compiled, heads
+from dms_core.model_files.model_tables import columns, compiled, heads
 from dms_core.results import States, regular_times
 
 

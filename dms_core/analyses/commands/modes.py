@@ -19,8 +19,7 @@ from dms_core.errors import SimulationError
 from dms_core.figures import require_matplotlib
 from dms_core.files.output_file import write_csv, write_json
 from dms_core.files.outputs import Outputs
-from dms_core.model_tables import compiled
-from dms_core.results import Result
+from dms_core.model_files.model_tables import compiled
 from dms_core.simulation.dynamics import World
 
 SHOWN = 24
@@ -85,10 +84,7 @@ def _linearised(model: Model, about: str) -> Linearisation:
     """
     if about == "equilibrium":
         return static_equilibrium(model).last.linearisation
-    world = World(model)
-    if world.settle() is not Result.SUCCESS:
-        raise SimulationError(world.message)
-    return linearise(model, world.operating_point(behind=True))
+    return linearise(World(model))
 
 
 def mode_table(modes: Sequence[Mode]) -> dict[str, np.ndarray]:

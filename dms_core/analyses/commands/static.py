@@ -18,7 +18,7 @@ from dms_core.command_line import LONG_RUN, FileOut
 from dms_core.errors import InputError, SimulationError
 from dms_core.files.output_file import check_columns, write_csv, write_json
 from dms_core.files.outputs import Outputs
-from dms_core.model_tables import columns, compiled
+from dms_core.model_files.model_tables import columns, compiled
 
 
 def static(

@@ -18,7 +18,7 @@ from dms_core.estimation.settings import FilterSettings
 from dms_core.estimation.unscented import filter_of
 from dms_core.files.output_file import check_columns, write_csv, write_json
 from dms_core.files.outputs import Outputs
-from dms_core.model_tables import compiled
+from dms_core.model_files.model_tables import compiled
 
 SHOWN = 10
 """Divergences that are printed."""

@@ -23,7 +23,7 @@ from pydantic import Field, model_validator
 
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import Coordinate, Force, Pattern, Placement, Vector
-from dms_core.model.forces.joint_moment import put_joint_moment
+from dms_core.model.forces.joint.joint_moment import put_joint_moment
 from dms_core.model.geometry.angle import add_angle_gradient, add_angle_rate_gradient, angle_rate
 from dms_core.model.geometry.rotations import vec
 from dms_core.model.geometry.sensed_angle import sensed_angle

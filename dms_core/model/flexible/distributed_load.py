@@ -24,8 +24,8 @@ from dms_core.compiled.jit import compiled
 from dms_core.errors import ModelError
 from dms_core.model.bodies.rigid_body import RigidBody
 from dms_core.model.element import Force, Pattern, Placement, Vector
-from dms_core.model.flexible.beam import Beam
-from dms_core.model.flexible.modal_body import ModalBody
+from dms_core.model.flexible.beams.beam import Beam
+from dms_core.model.flexible.modal.modal_body import ModalBody
 from dms_core.model.forces.lumped_load import LOAD, lumped_load, lumped_load_by_input
 from dms_core.model.forces.mass_moment import add_following, add_moment_load, moment_pattern
 from dms_core.model.geometry.rotations import columns, rotated, scale, vec

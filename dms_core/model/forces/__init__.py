@@ -3,15 +3,15 @@
 from dms_core.model.forces.bushing import Bushing, BushingCurves
 from dms_core.model.forces.first_order import FirstOrder
 from dms_core.model.forces.gravity import Gravity
-from dms_core.model.forces.joint_motor import JointMotor
-from dms_core.model.forces.joint_spring_damper import JointSpringDamper
-from dms_core.model.forces.joint_stop import JointStop
+from dms_core.model.forces.joint.joint_motor import JointMotor
+from dms_core.model.forces.joint.joint_spring_damper import JointSpringDamper
+from dms_core.model.forces.joint.joint_stop import JointStop
+from dms_core.model.forces.joint.torsion_spring import TorsionSpring
+from dms_core.model.forces.joint.turn_counter import TurnCounter
 from dms_core.model.forces.load_curve import LoadCurve
 from dms_core.model.forces.lumped_load import LumpedLoad
 from dms_core.model.forces.second_order import SecondOrder
 from dms_core.model.forces.spring_damper import SpringDamper
-from dms_core.model.forces.torsion_spring import TorsionSpring
-from dms_core.model.forces.turn_counter import TurnCounter
 
 __all__ = [
     "Bushing",

@@ -50,9 +50,10 @@ class Reading:
 
 
 class Imperfection(Settings):
-    """Noise, delay and quantum that separate a channel from the truth."""
+    """Noise, bias, delay and quantum that separate a channel from the truth."""
 
     deviation: float = Field(default=0.0, ge=0.0, description="standard deviation of white noise [unit of the channel]")
+    bias: float = Field(default=0.0, description="constant that is added to the truth [unit of the channel]")
     delay: float = Field(default=0.0, ge=0.0, le=0.5, description="[s]; linear between two control periods")
     quantum: float = Field(default=0.0, ge=0.0, description="smallest step [unit of the channel]; 0: none")
 

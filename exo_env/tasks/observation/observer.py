@@ -68,7 +68,8 @@ class Observer:
         for (_, c), i, part in zip(self.channels, imperfections, self.structure, strict=True):
             delay = i.delay / period
             whole = np.floor(delay)
-            rows += [[i.deviation, i.quantum, c.scale, c.low, c.high, whole, delay - whole]] * (part.stop - part.start)
+            row = [i.deviation, i.bias, i.quantum, c.scale, c.low, c.high, whole, delay - whole]
+            rows += [row] * (part.stop - part.start)
         return np.array(rows, dtype=float)
 
     def _each(self, noise: bool | Mapping[str, Any]) -> list[Imperfection]:

@@ -9,8 +9,8 @@ from agents.__main__ import main
 from agents.commands.options import different_policies
 from agents.policies.baselines import POLICIES
 from agents.policies.learned import SHIPPED, LearnedPolicy
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 
 LEARNED = configs() / "policies" / "learned"
 OWN = "tests.agents.policies.test_own_policy:Half"

@@ -8,8 +8,8 @@ pytest.importorskip("sb3_contrib")
 
 from agents.distributed.sweep import in_order, planned
 from agents.distributed.variations import Variation, folder_of, read_variations
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from tests.agents.tiny import config_file
 
 SHIPPED = configs() / "ablations" / "hidden_intent.yml"
@@ -62,17 +62,28 @@ def test_changes_are_made_and_folders_bear_the_name(tmp_path):
         planned((tmp_path / "ppo.yml",), (0,), (), tmp_path, None, [Variation("ppo", tmp_path / "ppo.yml")])
 
 
+def test_what_learns_from_another_variation_waits_for_it(tmp_path):
+    agents = configs() / "agents" / "hidden_intent"
+    text = (
+        f"student: {{config: {agents / 'student.yml'}, set: ['training.imitation.teacher=../teacher_{{seed}}']}}\n"
+        f"teacher: {{config: {agents / 'teacher.yml'}}}\n"
+    )
+    groups = in_order(planned((), (0, 1), (), tmp_path, None, read_variations(listed(tmp_path, text))))
+    order = {Path(folder).name: k for k, group in enumerate(groups) for _, _, folder in group}
+    assert order == {"teacher_0": 0, "teacher_1": 0, "student_0": 1, "student_1": 1}
+    (content,) = (c for group in groups for c, _, folder in group if Path(folder).name == "student_1")
+    assert content["training"]["imitation"]["teacher"] == str(folder_of(tmp_path, "teacher", 1))
+
+
 def test_the_shipped_list_can_be_trained(tmp_path):
     variations = read_variations(SHIPPED)
-    groups = in_order(planned((), (0, 1), (), tmp_path, None, variations))
-    order = {Path(folder).name: k for k, group in enumerate(groups) for _, _, folder in group}
-    assert len(order) == 2 * len(variations)
-    assert order["student_0"] < order["reinforced_0"] and order["teacher_0"] < order["learned_teacher_0"]
-    assert order["rope_teacher_1"] < order["rope_tension_1"] and order["no_teacher_0"] == 0
-    contents = {Path(folder).name: content for group in groups for content, _, folder in group}
-    settings = {n: next(v for k, v in c.items() if k != "training")["env_kwargs"] for n, c in contents.items()}
-    assert settings["clock_0"]["observation"] == ["device", "clock"] and settings["wide_1"]["patient"] == "wide"
+    shares = planned((), (0, 1), (), tmp_path, None, variations)
+    contents = {Path(folder).name: content for content, _, folder in shares}
+    assert len(contents) == 2 * len(variations)
+    sections = {n: next(v for k, v in c.items() if k != "training") for n, c in contents.items()}
+    settings = {name: section["env_kwargs"] for name, section in sections.items()}
+    assert settings["clock_0"]["observation"] == ["device", "clock"] and settings["mixed_1"]["patient"] == "mixed"
     assert settings["one_patient_0"]["patient"]["strength"] == 0.81
-    assert contents["impedance_1"]["training"]["imitation"]["teacher"] == str(
-        folder_of(tmp_path, "impedance_teacher", 1)
-    )
+    assert settings["impedance_1"]["action_mode"] == "impedance" and settings["emg_0"]["observation"][1] == "emg"
+    assert not contents["no_memory_0"]["training"]["traces"] and not contents["blind_critic_0"]["training"]["critic"]
+    assert {s["n_timesteps"] for n, s in sections.items() if not n.startswith("imitation")} == {1500000}

@@ -19,8 +19,8 @@ from agents.evaluation.search.tries import EXACT, KeptTries, Try, beside, read_t
 from agents.evaluation.search.tuning import STREAM, tunable, tune
 from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.tuned import HIDDEN_INTENT, Range
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from dms_core.files.yaml_text import read_yaml
 
 ROOT = Path(__file__).resolve().parents[3]

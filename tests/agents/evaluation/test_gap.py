@@ -16,8 +16,8 @@ from agents.evaluation.results.tables import gap_lines, short_table, whole_table
 from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.learned import Description, LearnedPolicy, find_policy
 from agents.policies.policy import Policy
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 
 HIDDEN = "exo/HiddenIntent-v0"
 SHORT = {"episode_duration": 0.4}

@@ -19,7 +19,7 @@ from agents.evaluation.episodes.measures import (
     sparc,
 )
 from agents.policies.policy import Policy
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 from exo_env.tasks.movements.repetition import Repetition
 
 FREQUENCY = 100.0

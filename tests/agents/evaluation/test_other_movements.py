@@ -14,8 +14,8 @@ from agents.evaluation.episodes.episode import judged, movement_of
 from agents.evaluation.results.tables import left_out_lines
 from agents.evaluation.search.upper_bound import tried_on
 from agents.policies.baselines import policy
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from exo_env.tasks.movements.movement import Stay
 from exo_env.tasks.movements.repetition import Repetitions
 

@@ -47,12 +47,14 @@ def test_noise_and_delay_reach_the_sensors_that_are_seen_and_nothing_else():
     before = {f"{g}.{c.name}": c.imperfection for g, c in world.observer.channels}
     noise = SHIFTS["sensor_noise"].plan(PLAN, Listener(), 4.0).settings["noise"]
     delay = SHIFTS["sensor_delay"].plan(PLAN, Listener(), 80.0).settings["noise"]
-    assert "device.last_action" not in {*noise, *delay}, "a device knows what it did"
+    bias = SHIFTS["sensor_bias"].plan(PLAN, Listener(), 0.05).settings["noise"]
+    assert "device.last_action" not in {*noise, *delay, *bias}, "a device knows what it did"
     assert {*delay} == {*before} - {"device.last_action"} and "imu.gyro" in noise
     assert noise["device.angle"]["quantum"] == 4.0 * before["device.angle"].quantum
     assert noise["emg.emg"]["deviation"] == 4.0 * before["emg.emg"].deviation
     assert noise["emg.emg"]["delay"] == before["emg.emg"].delay
     assert delay["emg.emg"]["delay"] == pytest.approx(before["emg.emg"].delay + 0.08)
+    assert bias["device.tension"]["bias"] == pytest.approx(0.05 * 100.0) and bias["device.tension"]["delay"] == 0.0
     oracle = SHIFTS["sensor_delay"].plan(PLAN, policy("oracle"), 80.0).settings.get("noise", {})
     assert not any(name.startswith("privileged") for name in oracle), "what no sensor measures has no fault"
 

@@ -13,8 +13,8 @@ from agents.policies.assist_as_needed import AssistAsNeeded
 from agents.policies.baselines import POLICIES, policy
 from agents.policies.lagging_pid import LaggingPid
 from agents.policies.tuned import Range, numbers
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from dms_core.files.yaml_text import read_yaml
 
 SHORT = {"episode_duration": 0.6}

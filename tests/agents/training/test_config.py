@@ -11,8 +11,8 @@ import yaml
 from agents.environment import ENVIRONMENT, check_settings
 from agents.training.settings.config import Config
 from agents.training.settings.rl_zoo_text import read_call, write_call
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from dms_core.files.yaml_text import yaml_of
 from tests.agents.tiny import config_file, content
 

@@ -9,8 +9,8 @@ import yaml
 
 from agents.environment import ENVIRONMENT, make
 from agents.training.settings.config import Config
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from exo_env.envs.with_settings import WithSettings
 from tests.agents.tiny import content
 

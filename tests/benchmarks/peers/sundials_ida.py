@@ -17,12 +17,12 @@ import numpy as np
 from numba import carray, cfunc, types
 
 from dms_core import World
+from dms_core.assembly.pattern.sparsity import NewtonPattern, newton_pattern
 from dms_core.assembly.residual import evaluate_newton
-from dms_core.assembly.sparsity import NewtonPattern, newton_pattern
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import Packed, fields, floats, inner, ints, naturals, table_at
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.parts import PARTS, run_part, set_inputs
+from dms_core.simulation.iteration.parts import PARTS, run_part, set_inputs
 from dms_core.simulation.state import STATE
 
 NEWTON_COEFFICIENT = 0.01

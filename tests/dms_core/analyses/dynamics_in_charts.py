@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 
 
 class Charted:

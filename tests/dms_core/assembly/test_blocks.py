@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.errors import InputError
 from dms_core.model import (
     AngleDriver,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dms_core.assembly.blocks import SensorBlocks
+from dms_core.assembly.derivatives.blocks import SensorBlocks
 from dms_core.assembly.model import Model
 from dms_core.errors import ModelError
 from dms_core.model import (

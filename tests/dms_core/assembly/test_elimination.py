@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, Simulation, SolverOptions, World, simulate
-from dms_core.assembly.elimination import Welds
+from dms_core.assembly.pattern.elimination import Welds
 from dms_core.model import (
     Constant,
     Fixed,

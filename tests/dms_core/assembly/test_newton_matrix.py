@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 from dms_core.errors import AssemblyError, InputError, ModelError, ModelWarning
 from dms_core.linear.rank import minimum_norms

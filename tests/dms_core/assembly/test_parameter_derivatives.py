@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, ModelError
 from dms_core.model import JointMoment, MuscleSensor, System

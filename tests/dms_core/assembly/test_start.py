@@ -53,7 +53,7 @@ def test_a_rounded_start_is_not_worth_a_warning():
 
 def test_the_command_line_says_it_in_one_sentence(tmp_path, capsys):
     from dms_core.__main__ import main
-    from dms_core.model_file import dump
+    from dms_core.model_files.model_file import dump
 
     path = tmp_path / "model.yaml"
     path.write_text(dump(_shifted(0.46)))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dms_core import Model
-from dms_core.model_file import load
+from dms_core.model_files.model_file import load
 
 
 def model(name: str) -> Model:

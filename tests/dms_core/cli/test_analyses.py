@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from dms_core.command_line import FAILED_RUN, USER_MISTAKE
-from dms_core.config_files import config_file, configs
-from dms_core.model_file import dump
+from dms_core.files.config_files import config_file, configs
+from dms_core.model_files.model_file import dump
 from tests.dms_core.analyses.mechanisms import von_mises_truss
 from tests.dms_core.cli.tables import read
 

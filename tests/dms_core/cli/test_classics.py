@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from dms_core.config_files import config_file, configs
+from dms_core.files.config_files import config_file, configs
 
 DAE = Path(__file__).parents[2] / "reference" / "dae"
 

@@ -17,10 +17,10 @@ from tqdm import tqdm
 
 from dms_core import SolverOptions, simulate
 from dms_core.command_line import BAR, FAILED_RUN, USER_MISTAKE, moves
-from dms_core.config_files import config_file, configs
+from dms_core.files.config_files import config_file, configs
 from dms_core.files.output_file import with_unit, write_csv, write_file
-from dms_core.model_file import load
-from dms_core.schema import reference
+from dms_core.model_files.model_file import load
+from dms_core.model_files.schema import reference
 from tests.dms_core.cli.tables import read
 
 ROOT = configs().parent

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dms_core.command_line import USER_MISTAKE
-from dms_core.config_files import config_file
+from dms_core.files.config_files import config_file
 from dms_core.files.output_file import write_csv
 from tests.dms_core.cli.tables import read
 

@@ -14,9 +14,9 @@ import pytest
 
 from dms_core import Model, simulate
 from dms_core.__main__ import main
-from dms_core.config_files import config_file
 from dms_core.files import output_place
-from dms_core.model_file import load
+from dms_core.files.config_files import config_file
+from dms_core.model_files.model_file import load
 from dms_core.results import Result
 from dms_core.simulation.dynamics import Simulation
 
@@ -140,9 +140,9 @@ def test_a_full_disk_loses_no_run(tmp_path, capsys, monkeypatch):
 def test_ctrl_c_keeps_the_part_under_a_name_that_says_so(tmp_path, capsys, monkeypatch):
     known, calls = Simulation._advance, []
 
-    def advance(self, t_end, progress):
+    def advance(self, t_end, progress, once):
         calls.append(1)
-        known(self, 0.05, progress)
+        known(self, 0.05, progress, once)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Simulation, "_advance", advance)
@@ -156,7 +156,7 @@ def test_ctrl_c_keeps_the_part_under_a_name_that_says_so(tmp_path, capsys, monke
 
 
 def test_ctrl_c_before_anything_is_computed_says_so(tmp_path, capsys, monkeypatch):
-    def advance(self, t_end, progress):
+    def advance(self, t_end, progress, once):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Simulation, "_advance", advance)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from dms_core.compiled.code_key import code_key
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 FILES = {
     "numbers.py": "from typing import NamedTuple\n\nSCALE = 2.0\n\nclass Place(NamedTuple):\n    a: int\n    b: int\n\n"

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from dms_core.compiled import side_by_side
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 WORK = """
 from pathlib import Path

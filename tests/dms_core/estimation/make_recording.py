@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from dms_core import SolverOptions, simulate
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 from dms_core.files.output_file import write_csv, write_text
 from dms_core.model import Input, Spline, System
-from dms_core.model_file import load
+from dms_core.model_files.model_file import load
 
 FARTHER = 1.05
 """How much farther down the true flexor is tied."""

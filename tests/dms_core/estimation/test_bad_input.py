@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, simulate
-from dms_core.config_files import config_file
 from dms_core.errors import InputError, ModelError
 from dms_core.estimation import FilterSettings
 from dms_core.estimation.gaussian import truncated
@@ -14,8 +13,9 @@ from dms_core.estimation.kalman import KalmanFilter
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import checked_covariance
+from dms_core.files.config_files import config_file
 from dms_core.model import Constant, Input, LineGuide, Point, PointMass, PositionDriver, System
-from dms_core.model_file import load
+from dms_core.model_files.model_file import load
 from tests.dms_core.estimation.systems import driven_four_bar, masses
 
 CHANNEL = {"at1.position.x": {"deviation": 0.01}}

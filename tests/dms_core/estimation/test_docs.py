@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dms_core.__main__ import main
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 from tests.dms_core.cli.tables import read
 
 ROOT = configs().parent

@@ -8,7 +8,7 @@ import pytest
 from dms_core import Model, SolverOptions, simulate
 from dms_core.errors import InputError, ModelError
 from dms_core.model import Input, PointMass, Samples, SecondOrder, System, Table
-from dms_core.model_file import dump, load
+from dms_core.model_files.model_file import dump, load
 
 GOOD = "time_s,force_N,angle_deg\n0.0,1.0,0.0\n0.5,3.0,90.0\n1.0,2.0,180.0\n"
 

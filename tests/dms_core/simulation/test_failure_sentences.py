@@ -9,9 +9,9 @@ import pytest
 from numba import njit
 
 from dms_core import Result, Simulation, SolverOptions, System
-from dms_core.assembly.finite import far_numbers
+from dms_core.assembly.derivatives.finite import far_numbers
+from dms_core.assembly.derivatives.wrong_derivatives import wrong_call
 from dms_core.assembly.tables import MODEL
-from dms_core.assembly.wrong_derivatives import wrong_call
 from dms_core.compiled.arena import Packed, inner
 from dms_core.model import LineGuide, PointMass, Revolute, RigidBody
 from dms_core.model.element import Force, Placement

@@ -244,7 +244,7 @@ class TestFibres:
 
     def test_statistics_and_sentence_of_the_command(self, tmp_path, capsys):
         from dms_core.__main__ import main
-        from dms_core.model_file import dump
+        from dms_core.model_files.model_file import dump
 
         model, stats = tmp_path / "m.yaml", tmp_path / "s.json"
         model.write_text(dump(_muscle()))

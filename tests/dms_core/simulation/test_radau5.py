@@ -7,7 +7,7 @@ import pytest
 
 from dms_core import Model, Result, Simulation, SolverOptions, System, Trajectory, World, simulate
 from dms_core.model import Harmonic, Input, LineGuide, LumpedLoad, PathPoint, PointMass, RopeLength, Steps
-from dms_core.simulation.radau_constants import A_INVERSE, COMPLEX, ERROR, REAL, STAGES, T_INVERSE, A, C, T
+from dms_core.simulation.methods.radau_constants import A_INVERSE, COMPLEX, ERROR, REAL, STAGES, T_INVERSE, A, C, T
 from tests.dms_core.literature.chain import chain
 
 T_END = 0.8

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from dms_core.config_files import config_file
+from dms_core.files.config_files import config_file
 from exo_env.__main__ import main
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.paper.figures import scenario_figures

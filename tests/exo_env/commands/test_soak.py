@@ -4,7 +4,7 @@ import gymnasium
 import pytest
 import yaml
 
-from dms_core.config_files import config_file
+from dms_core.files.config_files import config_file
 from exo_env.__main__ import main
 from exo_env.envs import lookup
 from exo_env.envs.elbow_lift import ElbowLiftEnv

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from dms_core import Model
-from dms_core.config_files import config_file
 from dms_core.errors import InputError
+from dms_core.files.config_files import config_file
 from dms_core.model import Constant
 from dms_core.model.geometry.frames import rotation_matrix
 from exo_env.ecosystem.arm import Arm

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from dms_core.config_files import config_file
 from dms_core.errors import InputError
+from dms_core.files.config_files import config_file
 from exo_env.ecosystem.arm import ELBOW_STOP, Arm
 from exo_env.ecosystem.person import MASS_0, Person
 from exo_env.envs.elbow_lift import ElbowLiftEnv

@@ -5,8 +5,8 @@ import copy
 import pytest
 import yaml
 
-from dms_core.config_files import config_file
 from dms_core.errors import InputError
+from dms_core.files.config_files import config_file
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.subject import read_subject

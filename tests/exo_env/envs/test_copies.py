@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from gymnasium.wrappers import RecordEpisodeStatistics
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from exo_env.clearing import Kept, arrays_of
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 

@@ -6,8 +6,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 
 HOLD = np.array([-1.0, -1.0])

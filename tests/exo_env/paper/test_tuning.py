@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from dms_core.config_files import config_file
+from dms_core.files.config_files import config_file
 from dms_core.files.outputs import MANIFEST
 from dms_core.model.control.ziegler_nichols import STEP, oscillation
 from exo_env.__main__ import main

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.ecosystem import Ecosystem
 from exo_env.ecosystem.exoskeleton import Exoskeleton

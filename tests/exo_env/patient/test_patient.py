@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from dms_core.files.yaml_text import read_yaml
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.person import Person

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dms_core.config_files import configs
 from dms_core.errors import InputError
+from dms_core.files.config_files import configs
 from exo_env.patient.distributions import distribution, weighted
 from exo_env.patient.patient import Patient
 from exo_env.patient.population import Population, population, shipped_populations

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from dms_core.config_files import configs
 from dms_core.figures import letter
+from dms_core.files.config_files import configs
 from exo_env.rendering.panels import legend, log_scale, note, save
 
 pytest.importorskip("matplotlib")

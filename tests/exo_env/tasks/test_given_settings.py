@@ -14,7 +14,7 @@ from exo_env.tasks.judgement.rewards import Weights
         ({"reward_weights": 3}, "reward_weights = 3: expected a mapping with some of .*tracking"),
         ({"reward_weights": {1: 2.0}}, "reward_weights = {1: 2.0}: expected a mapping"),
         ({"limits": "abc"}, "limits = 'abc': expected a mapping with some of .*highest_deg"),
-        ({"noise": {"angle": 3}}, "noise: angle = 3: expected a mapping with some of delay, deviation, quantum"),
+        ({"noise": {"angle": 3}}, "noise: angle = 3: expected a mapping with some of bias, delay, deviation, quantum"),
         ({"noise": {"angle": {"delay": 9.0}}}, "noise: angle: Imperfection: delay = 9.0"),
         ({"noise": np.float64(2.0)}, r"noise = 2\.0: expected True"),
         ({"observation": [["device"]]}, "observation = .*'device'.*: expected a list of different groups of device"),

@@ -40,10 +40,10 @@ def test_observations_are_the_readings(noise):
     assert abs(_part(env, observation, "guide_force")[0]) == pytest.approx(force, rel=1e-5)
 
 
-def test_noise_delay_and_quantisation():
+def test_noise_bias_delay_and_quantisation():
     reading = {"hinge": 1.0, "hinge_rate": 0.0, "tension": [1.0, 2.0], "guide_force": 0.0, "reference": 0.0,
                "reference_rate": 0.0, "preview": [0.0] * 3, "last_action": [0.0, 0.0]}  # fmt: skip
-    spec = {"angle": {"delay": 0.03}, "rate": {"quantum": 0.25}, "guide_force": {"deviation": 2.0}}
+    spec = {"angle": {"delay": 0.03}, "rate": {"quantum": 0.25, "bias": 0.3}, "guide_force": {"deviation": 2.0}}
     task = LiftTask(Parts(("flexor",), ("agonist", "antagonist"), ("first", "second")))
     observer = Observer(["device"], task.readings, task.groups, spec, 0.02)
     generator, first = np.random.default_rng(0), first_places(task.readings)
@@ -61,7 +61,8 @@ def test_noise_delay_and_quantisation():
     rows = [observed({"hinge": 1.0 + k, "hinge_rate": 0.1 + 0.1 * k}) for k in (1, 2, 3)]
     # 1.5 periods late, between two samples; the range ends at 3.
     np.testing.assert_allclose([row[0] for row in rows], [1.0, 1.5, 2.5])
-    np.testing.assert_allclose([row[1] for row in rows], [0.25, 0.25, 0.5])
+    # 0.5, 0.6 and 0.7 with the bias, then in quanta of 0.25.
+    np.testing.assert_allclose([row[1] for row in rows], [0.5, 0.5, 0.75])
     many = np.array([observed({})[4] * 10.0 for _ in range(4000)])
     # Standard error of a deviation from 4000 numbers: 2 / sqrt(8000) = 0.022; four of them.
     assert many.std() == pytest.approx(2.0, abs=0.09) and abs(many.mean()) < 0.13

@@ -26,7 +26,7 @@ from dms_core.model.constraints.joints.screw import Screw
 from dms_core.model.constraints.joints.slider import Slider
 from dms_core.model.constraints.primitives import dot2, joint_pattern
 from dms_core.model.element import Constraint, ConstraintPattern, DynamicElement, Placement
-from dms_core.model.forces.turn_counter import TurnCounter, whole_turns
+from dms_core.model.forces.joint.turn_counter import TurnCounter, whole_turns
 from dms_core.model.geometry.angle import (
     add_angle_gradient,
     add_angle_hessian,

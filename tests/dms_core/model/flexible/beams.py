@@ -6,7 +6,7 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.model import Beam, BeamElement, BeamSection, Fixed, Input, LumpedLoad, RigidBody, System
-from dms_core.model.flexible.beam_element import BEAM, beam_forces
+from dms_core.model.flexible.beams.beam_element import BEAM, beam_forces
 from dms_core.model.geometry.frames import g_matrix, rotation_matrix
 from dms_core.model.geometry.rotations import bilinear
 

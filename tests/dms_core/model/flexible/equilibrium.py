@@ -7,7 +7,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from dms_core.assembly.blocks import OperatingPoint
+from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 
 

@@ -8,7 +8,7 @@ import pytest
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, ModelError
 from dms_core.model import Beam, BeamElement, BeamLoad, BeamSection, Fixed, PointMass, RigidBody, System
-from dms_core.model_file import dump, load
+from dms_core.model_files.model_file import dump, load
 from tests.dms_core.model.flexible.beams import SLENDER, cantilever, tip
 from tests.dms_core.model.flexible.equilibrium import at_rest, equilibrium
 

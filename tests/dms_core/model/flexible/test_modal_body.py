@@ -23,9 +23,9 @@ from dms_core.model import (
     craig_bampton,
     orthogonal,
 )
-from dms_core.model.flexible.modal_data import skew
+from dms_core.model.flexible.modal.modal_data import skew
 from dms_core.model.geometry.frames import g_matrix, rotation_matrix
-from dms_core.model_file import dump, load
+from dms_core.model_files.model_file import dump, load
 from dms_core.simulation.dynamics import SolverOptions, simulate
 from tests.dms_core.model.flexible.beams import EI, SLENDER
 from tests.dms_core.model.flexible.equilibrium import at_rest, equilibrium, frequencies, place

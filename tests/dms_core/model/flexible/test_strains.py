@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from dms_core.model.flexible import strains as strain
-from dms_core.model.flexible.beam_element import beam_forces
+from dms_core.model.flexible.beams import strains as strain
+from dms_core.model.flexible.beams.beam_element import beam_forces
 from dms_core.model.geometry.frames import quaternion, quaternion_product, rotation_matrix
 from tests.example_elements.flexible import beam
 from tests.example_elements.kernel_call import kernel_calls

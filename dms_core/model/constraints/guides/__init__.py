@@ -1,0 +1,1 @@
+"""Guides: a point on a line or a plane of another body."""

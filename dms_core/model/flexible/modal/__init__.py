@@ -1,0 +1,1 @@
+"""Modal bodies in a floating frame."""

@@ -1,0 +1,1 @@
+"""Force elements that act about a joint's axis."""

@@ -1,0 +1,1 @@
+"""Model files: their reader, their tables and their reference."""

@@ -1,0 +1,1 @@
+"""What solves an implicit stage: Newton's iteration, its matrix, and what keeps the matrix solvable."""
