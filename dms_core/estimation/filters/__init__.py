@@ -1,0 +1,1 @@
+"""Filters: what is estimated, its charts, prediction, correction; in Python and compiled."""
