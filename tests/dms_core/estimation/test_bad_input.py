@@ -8,10 +8,10 @@ import pytest
 from dms_core import Model, SolverOptions, simulate
 from dms_core.errors import InputError, ModelError
 from dms_core.estimation import FilterSettings
-from dms_core.estimation.filters.gaussian import truncated
-from dms_core.estimation.filters.kalman import KalmanFilter
-from dms_core.estimation.records.measurement import Measurements
-from dms_core.estimation.records.record import estimate
+from dms_core.estimation.gaussian import truncated
+from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.measurement import Measurements
+from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import checked_covariance
 from dms_core.files.config_files import config_file
 from dms_core.model import Constant, Input, LineGuide, Point, PointMass, PositionDriver, System

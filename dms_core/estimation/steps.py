@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dms_core.estimation.filters.estimated import Belief
+from dms_core.estimation.estimated import Belief
 
 
 @dataclass(frozen=True)

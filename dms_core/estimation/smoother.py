@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from dms_core.estimation.filters.estimated import Belief
-from dms_core.estimation.filters.gaussian import symmetric
-from dms_core.estimation.filters.kalman import KalmanFilter
-from dms_core.estimation.records.steps import Step
+from dms_core.estimation.estimated import Belief
+from dms_core.estimation.gaussian import symmetric
+from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.steps import Step
 
 ROUNDING = 1e-14
 """Eigenvalue of a scaled covariance below which a direction is known exactly."""

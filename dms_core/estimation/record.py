@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dms_core.errors import InputError, SimulationError
-from dms_core.estimation.filters.estimated import Belief
-from dms_core.estimation.filters.kalman import KalmanFilter
-from dms_core.estimation.filters.nominal_world import held_input
-from dms_core.estimation.records.measurement import Measurements
-from dms_core.estimation.records.smoother import smoothed
-from dms_core.estimation.records.steps import Step
-from dms_core.estimation.records.unlearnt import check_learnt
+from dms_core.estimation.estimated import Belief
+from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.measurement import Measurements
+from dms_core.estimation.nominal_world import held_input
+from dms_core.estimation.smoother import smoothed
+from dms_core.estimation.steps import Step
+from dms_core.estimation.unlearnt import check_learnt
 from dms_core.files.output_file import with_unit
 
 SAME_TIME = 1e-9

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.linalg as la
 
 from dms_core.errors import InputError
-from dms_core.estimation.filters.estimated import Belief
-from dms_core.estimation.filters.kalman import KalmanFilter
+from dms_core.estimation.estimated import Belief
+from dms_core.estimation.kalman import KalmanFilter
 
 UNCHANGED = 0.999
 """Share of the variance without readings from which on a direction counts as untold."""

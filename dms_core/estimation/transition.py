@@ -16,8 +16,8 @@ import numpy as np
 from dms_core.analyses.linearise import Linearisation, linearise
 from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.errors import SimulationError
-from dms_core.estimation.filters.charts import Chart, chart_at
-from dms_core.estimation.filters.nominal_world import FINER, NominalWorld
+from dms_core.estimation.charts import Chart, chart_at
+from dms_core.estimation.nominal_world import FINER, NominalWorld
 from dms_core.sensitivity.steps import carry_forward, differentiated_step
 from dms_core.sensitivity.tables import KIND, Columns, new_columns, new_differentials
 

@@ -1,1 +1,0 @@
-"""Filters: what is estimated, its charts, prediction, correction; in Python and compiled."""
