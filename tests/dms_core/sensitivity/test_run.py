@@ -25,7 +25,7 @@ direction is itself a difference, to 1e-9 of the number's own effect."""
 BENT = {"arm": 1e-5}
 """As TOLERANCE where curves of muscles bend: their second derivatives jump, so that a difference errs with its step."""
 SAME = {"sdirk2": 1e-10, "bdf2": 1e-10, "radau5": 3e-10}
-"""Forward and adjoint do the same sums in other orders over hundreds of steps; Radau IIA solves three stages at a time."""
+"""Forward and adjoint do the same sums in another order; Radau IIA solves three stages at a time."""
 
 
 def _run(model: Model, method: str, times=(0.05, 0.12), settings=(), rtol: float = 1e-6) -> RecordedWorld:
