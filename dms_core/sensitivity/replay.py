@@ -108,12 +108,20 @@ class Replay(World):
         # A step must not end behind a jump of the inputs, not even by rounding.
         while t + h > end:
             h = math.nextafter(h, 0.0)
-        if not self._differentiate(k, h):
+        if not self._differentiate(k, h) and not self._differentiate_from_afar(k, h, x):
             raise SimulationError(
                 f"system '{self.model.system.name}': the recorded step from t = {t:.6g} s to {end:.6g} s cannot be "
                 "solved again."
             )
         return h
+
+    def _differentiate_from_afar(self, k: int, h: float, x: np.ndarray | None) -> bool:
+        """As `_differentiate`, from a fresh start of the method: accelerations and multipliers that belong to it."""
+        self._put(k, self.state_at(k) if x is None else x)
+        self.differentials.values.numbers[NUMBERS.known] = 0.0
+        m, s = self._tables.table, self._world.table
+        set_inputs(m, s, self.record.times[k], False)
+        return bool(run_rates(m, s, PARTS.consistent_rates, 0.0)) and self._differentiate(k, h)
 
     def _differentiate(self, k: int, h: float) -> bool:
         if self.options.method == "radau5":
