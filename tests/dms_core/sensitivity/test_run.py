@@ -79,6 +79,7 @@ def test_derivatives_equal_differences_over_the_recorded_steps(name, method):
         Sensitivity(_run(SYSTEMS[name](), method, (0.05, 0.1), rtol=rtol), of, tuple(steps)),
         steps,
         BENT.get(name, TOLERANCE),
+        STIFF.get(name, 1.0),
     )
 
 
