@@ -27,6 +27,18 @@ from dms_core.simulation.step_control import accept
 
 
 @compiled
+def _guess_end(s, d):
+    """The recorded end of the step, where it is known, as guess of its last stage."""
+    if floats(d, DIFFERENTIALS.numbers)[NUMBERS.known] == 1.0:
+        q, v, end_q, end_v = (
+            floats(s, STATE.q_guess), floats(s, STATE.v_guess), floats(d, DIFFERENTIALS.end_q),
+            floats(d, DIFFERENTIALS.end_v),
+        )  # fmt: skip
+        for i in range(q.shape[0]):
+            q[i], v[i] = end_q[i], end_v[i]
+
+
+@compiled
 def _sdirk2(m, s, o, d, h):
     """Solve and differentiate the two stages of a step of size h; False where either fails."""
     t, c0, numbers = floats(s, STATE.clock)[CLOCK.t], 1.0 / (GAMMA * h), floats(d, DIFFERENTIALS.numbers)
@@ -36,6 +48,7 @@ def _sdirk2(m, s, o, d, h):
     if code != NEWTON.converged or not differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.first), c0):
         return False
     prepare_second_stage(s, h, c0)
+    _guess_end(s, d)
     code, _ = run_stage(m, s, o, t + h, c0, 0.0, True)
     return code == NEWTON.converged and differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.second), c0)
 
@@ -50,6 +63,7 @@ def _bdf2(m, s, o, d, h):
     numbers[NUMBERS.kind], numbers[NUMBERS.h], numbers[NUMBERS.c0] = KIND.bdf2, h, c0
     numbers[NUMBERS.by_q], numbers[NUMBERS.by_before] = -(1.0 + ratio) / h, ratio * ratio / (1.0 + ratio) / h
     prepare_bdf2(s, h, h1)
+    _guess_end(s, d)
     code, _ = run_stage(m, s, o, clock[CLOCK.t] + h, c0, ratio, True)
     return code == NEWTON.converged and differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.second), c0)
 
