@@ -10,7 +10,7 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals, with_settings
 from dms_core.compiled.arena import Packed
 from dms_core.model.system import System
-from dms_core.sensitivity.tables import KIND
+from dms_core.sensitivity.tangents.tables import KIND
 from dms_core.simulation.dynamics import BUFFER_ROWS, World
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.snapshot import Mark, Snapshot

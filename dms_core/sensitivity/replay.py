@@ -11,11 +11,10 @@ from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.compiled.arena import Packed
 from dms_core.errors import SimulationError
 from dms_core.sensitivity.nodes import Number
-from dms_core.sensitivity.radau import RadauStep
 from dms_core.sensitivity.record import RecordedWorld
-from dms_core.sensitivity.steps import carry_back, carry_forward, differentiated_step
-from dms_core.sensitivity.tables import CLOSEST, NUMBERS, new_differentials, new_movement
-from dms_core.simulation.iteration.addresses import part_addresses
+from dms_core.sensitivity.tangents.radau import RadauStep
+from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_differentials, new_movement
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.addresses import part_addresses
 from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs

@@ -14,9 +14,9 @@ the constraints already.
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import floats, inner, matrix, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.stage import differentiate_stage
-from dms_core.sensitivity.stage_solve import column_forward, output_back
-from dms_core.sensitivity.tables import ADJOINTS, COLUMNS, DIFFERENTIALS, KIND, NUMBERS
+from dms_core.sensitivity.tangents.stage import differentiate_stage
+from dms_core.sensitivity.tangents.stage_solve import column_forward, output_back
+from dms_core.sensitivity.tangents.tables import ADJOINTS, COLUMNS, DIFFERENTIALS, KIND, NUMBERS
 from dms_core.simulation.iteration.implicit_stage import set_weights
 from dms_core.simulation.iteration.newton import NEWTON
 from dms_core.simulation.iteration.parts import run_stage

@@ -19,7 +19,7 @@ import scipy.sparse.linalg as spla
 
 from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
 from dms_core.sensitivity.nodes import Number, by_numbers
-from dms_core.sensitivity.tables import Adjoints, Columns
+from dms_core.sensitivity.tangents.tables import Adjoints, Columns
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.implicit_stage import set_weights
 from dms_core.simulation.iteration.newton import NEWTON
