@@ -4,13 +4,13 @@ A model and noisy readings of some of its sensors give its state, inputs and con
 other sensors ("virtual sensing"), and how far each can be trusted.
 """
 
-from dms_core.estimation.compiled_filter import CompiledFilter
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.compiled_filter import CompiledFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
+from dms_core.estimation.filter.unscented import filter_of
 from dms_core.estimation.measurement import Measurements, read_measurements
 from dms_core.estimation.observability import empirical_observability, local_observability
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import Bias, Channel, EstimatedConstant, EstimatedInput, FilterSettings
-from dms_core.estimation.unscented import filter_of
 
 __all__ = [
     "Bias",

@@ -10,8 +10,8 @@ import numpy as np
 from dms_core.assembly.derivatives.parameter_derivatives import declared_number
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, choices
-from dms_core.estimation.charts import Chart
-from dms_core.estimation.nominal_world import declared_constant, held_input
+from dms_core.estimation.filter.charts import Chart
+from dms_core.estimation.filter.nominal_world import declared_constant, held_input
 from dms_core.estimation.settings import FilterSettings, checked_covariance
 
 

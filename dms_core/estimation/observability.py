@@ -19,7 +19,7 @@ import numpy as np
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.errors import InputError
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
 
 RANK = 1e-7
 """Singular value, over the largest one, from which on a direction counts as observed: differences leave about 1e-9."""

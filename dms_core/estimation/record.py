@@ -9,11 +9,11 @@ import numpy as np
 
 from dms_core.errors import InputError, SimulationError
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
+from dms_core.estimation.filter.nominal_world import held_input
+from dms_core.estimation.filter.smoother import smoothed
+from dms_core.estimation.filter.steps import Step
 from dms_core.estimation.measurement import Measurements
-from dms_core.estimation.nominal_world import held_input
-from dms_core.estimation.smoother import smoothed
-from dms_core.estimation.steps import Step
 from dms_core.estimation.unlearnt import check_learnt
 from dms_core.files.output_file import with_unit
 

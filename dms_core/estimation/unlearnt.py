@@ -13,7 +13,7 @@ import scipy.linalg as la
 
 from dms_core.errors import InputError
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
 
 UNCHANGED = 0.999
 """Share of the variance without readings from which on a direction counts as untold."""

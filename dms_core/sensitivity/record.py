@@ -10,13 +10,13 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.tables import Signals, with_settings
 from dms_core.compiled.arena import Packed
 from dms_core.model.system import System
-from dms_core.sensitivity.tables import KIND
+from dms_core.sensitivity.tangents.tables import KIND
 from dms_core.simulation.dynamics import BUFFER_ROWS, World
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.snapshot import Mark, Snapshot
 from dms_core.simulation.state import COUNTS
 
-MOST_STATES = 8192
+MOST_STATES = 32768
 """States kept; beyond that every second one is dropped, and what lies between is computed again when asked for."""
 
 
@@ -93,6 +93,10 @@ class RecordedWorld(World):
     def kept(self, k: int) -> np.ndarray:
         """(q, v) at row k, which is a multiple of `stride`, and at the row before, shape (2, 2 n_q)."""
         return self._kept[k]
+
+    def known(self, k: int) -> np.ndarray | None:
+        """As `kept`; None where the row is not kept."""
+        return self._kept.get(k)
 
     def row(self, k: int) -> Row:
         """Row k."""

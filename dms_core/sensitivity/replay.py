@@ -11,10 +11,10 @@ from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.compiled.arena import Packed
 from dms_core.errors import SimulationError
 from dms_core.sensitivity.nodes import Number
-from dms_core.sensitivity.radau import RadauStep
 from dms_core.sensitivity.record import RecordedWorld
-from dms_core.sensitivity.steps import carry_back, carry_forward, differentiated_step
-from dms_core.sensitivity.tables import CLOSEST, new_differentials, new_movement
+from dms_core.sensitivity.tangents.radau import RadauStep
+from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_differentials, new_movement
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.addresses import part_addresses
 from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
@@ -75,19 +75,21 @@ class Replay(World):
         s.q[:], s.v[:] = x[0, :n], x[0, n:]
         s.q_before[:], s.v_before[:] = x[1, :n], x[1, n:]
         s.qd[:] = s.v
-        s.vd[:] = self._acceleration(k, x[0, n:])
+        s.vd[:] = 0.0
         s.lam_before[:] = s.lam
         s.mu[:] = 0.0
         s.clock[CLOCK.t] = times[k]
         s.clock[CLOCK.h_before] = times[k] - times[k - 1] if k else 0.0
         s.counts[COUNTS.restart] = 0
 
-    def _acceleration(self, k: int, v: np.ndarray) -> np.ndarray:
-        """A guess for that of the step that begins at row k, from its recorded end; 0 where that is not kept."""
-        times = self.record.times
-        if self.record.stride > 1 or k + 1 >= len(times) or times[k + 1] == times[k]:
-            return np.zeros_like(v)
-        return (self.record.kept(k + 1)[0, len(v) :] - v) / (times[k + 1] - times[k])
+    def _guess(self, k: int) -> None:
+        """The recorded end of the step that begins at row k, where it is kept, and the acceleration to it."""
+        d, n, s = self.differentials.values, self.model.n_q, self.state
+        end = self.record.known(k + 1)
+        d.numbers[NUMBERS.known] = end is not None
+        if end is not None:
+            d.end_q[:], d.end_v[:] = end[0, :n], end[0, n:]
+            s.vd[:] = (d.end_v - s.v) / (self.record.times[k + 1] - self.record.times[k])
 
     def step(self, k: int, x: np.ndarray | None = None) -> float:
         """Take the step that begins at row k again and differentiate it; gives its size [s].
@@ -100,17 +102,26 @@ class Replay(World):
             SimulationError: the step cannot be solved again.
         """
         self._put(k, self.state_at(k) if x is None else x)
+        self._guess(k)
         t, end = self.record.times[k : k + 2]
         h = end - t
         # A step must not end behind a jump of the inputs, not even by rounding.
         while t + h > end:
             h = math.nextafter(h, 0.0)
-        if not self._differentiate(k, h):
+        if not self._differentiate(k, h) and not self._differentiate_from_afar(k, h, x):
             raise SimulationError(
                 f"system '{self.model.system.name}': the recorded step from t = {t:.6g} s to {end:.6g} s cannot be "
                 "solved again."
             )
         return h
+
+    def _differentiate_from_afar(self, k: int, h: float, x: np.ndarray | None) -> bool:
+        """As `_differentiate`, from a fresh start of the method: accelerations and multipliers that belong to it."""
+        self._put(k, self.state_at(k) if x is None else x)
+        self.differentials.values.numbers[NUMBERS.known] = 0.0
+        m, s = self._tables.table, self._world.table
+        set_inputs(m, s, self.record.times[k], False)
+        return bool(run_rates(m, s, PARTS.consistent_rates, 0.0)) and self._differentiate(k, h)
 
     def _differentiate(self, k: int, h: float) -> bool:
         if self.options.method == "radau5":

@@ -18,7 +18,7 @@ from dms_core.model.contact.contact import Contact
 from dms_core.sensitivity.nodes import Node, Number, node, start_columns
 from dms_core.sensitivity.record import RecordedWorld
 from dms_core.sensitivity.replay import Replay
-from dms_core.sensitivity.tables import new_adjoints, new_columns
+from dms_core.sensitivity.tangents.tables import new_adjoints, new_columns
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,17 @@ import dms_core
 import exo_env
 
 FOLDER = Path(dms_core.__file__).parent
+LATER = {"analyses", "sensitivity", "estimation", "model_files"}
+"""What stands on a world in time."""
 ABOVE = {
-    "linear": {"model", "assembly", "simulation", "analyses"},
-    "model": {"linear", "assembly", "simulation", "analyses"},
-    "assembly": {"simulation", "analyses"},
-    "compiled": {"simulation", "linear", "analyses"},
-    "simulation": {"analyses", "estimation"},
-    "analyses": {"estimation"},
+    "linear": {"model", "assembly", "simulation", *LATER},
+    "model": {"linear", "assembly", "simulation", *LATER},
+    "assembly": {"simulation", *LATER},
+    "compiled": {"simulation", "linear", *LATER},
+    "simulation": LATER,
+    "analyses": {"sensitivity", "estimation"},
     "sensitivity": {"estimation"},
-    "files": {"compiled", "linear", "model", "assembly", "simulation", "analyses"},
+    "files": {"compiled", "linear", "model", "assembly", "simulation", *LATER},
 }
 """What a folder must not import."""
 ORDER = {

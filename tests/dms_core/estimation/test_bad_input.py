@@ -8,8 +8,8 @@ import pytest
 from dms_core import Model, SolverOptions, simulate
 from dms_core.errors import InputError, ModelError
 from dms_core.estimation import FilterSettings
-from dms_core.estimation.gaussian import truncated
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.gaussian import truncated
+from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import checked_covariance

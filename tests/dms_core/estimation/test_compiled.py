@@ -8,7 +8,7 @@ import pytest
 from dms_core import Model
 from dms_core.errors import InputError, SimulationError
 from dms_core.estimation import Bias, Channel, EstimatedInput, FilterSettings, KalmanFilter
-from dms_core.estimation.compiled_filter import CompiledFilter
+from dms_core.estimation.filter.compiled_filter import CompiledFilter
 from tests.dms_core.estimation.systems import driven_four_bar, masses, slider_crank
 from tests.dms_core.estimation.test_observability import two_muscles
 

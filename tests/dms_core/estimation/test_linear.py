@@ -9,11 +9,11 @@ from scipy.stats import chi2
 
 from dms_core import Model
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
+from dms_core.estimation.filter.unscented import filter_of
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import InitialDeviations, MotionNoise
-from dms_core.estimation.unscented import filter_of
 from tests.dms_core.estimation import textbook
 from tests.dms_core.estimation.systems import masses
 

@@ -10,7 +10,7 @@ import pytest
 from dms_core import Model
 from dms_core.errors import InputError
 from dms_core.estimation import Bias, Channel, EstimatedInput, FilterSettings
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.estimation.measurement import Measurements, read_measurements
 from dms_core.estimation.record import estimate, events
 from tests.dms_core.estimation.systems import driven_four_bar, masses

@@ -7,10 +7,10 @@ import pytest
 
 from dms_core import Model, SolverOptions, simulate
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings
+from dms_core.estimation.filter.unscented import filter_of
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import Estimate, estimate
 from dms_core.estimation.settings import InitialDeviations
-from dms_core.estimation.unscented import filter_of
 from dms_core.model import Harmonic, Input, System
 from tests.dms_core.estimation.systems import driven_four_bar, slider_crank
 

@@ -8,7 +8,7 @@ import pytest
 from dms_core import Model
 from dms_core.errors import InputError
 from dms_core.estimation import Channel, EstimatedConstant, EstimatedInput, FilterSettings
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.observability import empirical_observability, local_observability
 from dms_core.estimation.record import estimate

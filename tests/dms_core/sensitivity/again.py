@@ -69,7 +69,6 @@ def again(run: Sensitivity, x: By, by: float) -> np.ndarray:
         if record.row(k + 1).start:
             record._kept[k + 1] = here
             continue
-        record._kept[k + 1] = np.array([here[0], here[0]])
         replay.step(k, here)
         record._kept[k + 1] = np.array([np.concatenate([replay.state.q, replay.state.v]), here[0]])
     return Sensitivity(record, run.of, []).value()

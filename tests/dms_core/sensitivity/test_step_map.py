@@ -11,7 +11,7 @@ import scipy.linalg as la
 from dms_core import Model, SolverOptions, World
 from dms_core.analyses.linearise import linearise
 from dms_core.errors import InputError
-from dms_core.sensitivity.step_map import StepMap, StepMatrices
+from dms_core.sensitivity.tangents.step_map import StepMap, StepMatrices
 from dms_core.simulation.methods.sdirk2 import GAMMA
 from tests.dms_core.analyses.mechanisms import double_pendulum, spring_mass_chain
 from tests.dms_core.sensitivity.systems import SYSTEMS, driven_crank

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 
-from dms_core.config_files import configs
+from dms_core.files.config_files import configs
 
 DOCS = configs().parent / "docs"
 

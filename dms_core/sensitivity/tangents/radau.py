@@ -11,7 +11,7 @@ the derivatives of one. The step ends with its last stage, on the constraints.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,15 +19,13 @@ import scipy.sparse.linalg as spla
 
 from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
 from dms_core.sensitivity.nodes import Number, by_numbers
-from dms_core.sensitivity.tables import Adjoints, Columns
+from dms_core.sensitivity.tangents.tables import Adjoints, Columns
+from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.implicit_stage import set_weights
 from dms_core.simulation.iteration.newton import NEWTON
 from dms_core.simulation.iteration.parts import run_radau5, set_inputs
 from dms_core.simulation.methods.radau_constants import A_INVERSE, STAGES, C
 from dms_core.simulation.state import CLOCK, COUNTS
-
-if TYPE_CHECKING:
-    from dms_core.sensitivity.replay import Replay
 
 PASSES = 12
 ROUNDING = 1e-9
@@ -46,7 +44,7 @@ class RadauStep:
         h: size of the step [s].
     """
 
-    def __init__(self, world: Replay, numbers: Sequence[Number], h: float) -> None:
+    def __init__(self, world: World, numbers: Sequence[Number], h: float) -> None:
         self._world, self._numbers, self._h = world, numbers, h
         tables = world.tables.values
         self._free, self._active = tables.free, tables.active

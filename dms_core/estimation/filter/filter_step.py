@@ -16,9 +16,9 @@ from dms_core.assembly.readings.sensing import read_sensors
 from dms_core.assembly.tables import SIGNALS, WORK
 from dms_core.compiled.arena import fields, floats, inner, ints, matrix
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.chart import CHART, lift, pick, solve_square
-from dms_core.sensitivity.steps import carry_forward, differentiated_step
-from dms_core.sensitivity.tables import COLUMNS, KIND
+from dms_core.sensitivity.tangents.chart import CHART, lift, pick, solve_square
+from dms_core.sensitivity.tangents.steps import carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.tables import COLUMNS, KIND
 from dms_core.simulation.iteration.parts import PARTS, restart, run_part
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 

@@ -14,9 +14,9 @@ the constraints already.
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import floats, inner, matrix, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.stage import differentiate_stage
-from dms_core.sensitivity.stage_solve import column_forward, output_back
-from dms_core.sensitivity.tables import ADJOINTS, COLUMNS, DIFFERENTIALS, KIND, NUMBERS
+from dms_core.sensitivity.tangents.stage import differentiate_stage
+from dms_core.sensitivity.tangents.stage_solve import column_forward, output_back
+from dms_core.sensitivity.tangents.tables import ADJOINTS, COLUMNS, DIFFERENTIALS, KIND, NUMBERS
 from dms_core.simulation.iteration.implicit_stage import set_weights
 from dms_core.simulation.iteration.newton import NEWTON
 from dms_core.simulation.iteration.parts import run_stage
@@ -24,6 +24,18 @@ from dms_core.simulation.methods.bdf2 import prepare_bdf2
 from dms_core.simulation.methods.sdirk2 import GAMMA, prepare_first_stage, prepare_second_stage
 from dms_core.simulation.state import CLOCK, STATE
 from dms_core.simulation.step_control import accept
+
+
+@compiled
+def _guess_end(s, d):
+    """The recorded end of the step, where it is known, as guess of its last stage."""
+    if floats(d, DIFFERENTIALS.numbers)[NUMBERS.known] == 1.0:
+        q, v, end_q, end_v = (
+            floats(s, STATE.q_guess), floats(s, STATE.v_guess), floats(d, DIFFERENTIALS.end_q),
+            floats(d, DIFFERENTIALS.end_v),
+        )  # fmt: skip
+        for i in range(q.shape[0]):
+            q[i], v[i] = end_q[i], end_v[i]
 
 
 @compiled
@@ -36,6 +48,7 @@ def _sdirk2(m, s, o, d, h):
     if code != NEWTON.converged or not differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.first), c0):
         return False
     prepare_second_stage(s, h, c0)
+    _guess_end(s, d)
     code, _ = run_stage(m, s, o, t + h, c0, 0.0, True)
     return code == NEWTON.converged and differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.second), c0)
 
@@ -50,6 +63,7 @@ def _bdf2(m, s, o, d, h):
     numbers[NUMBERS.kind], numbers[NUMBERS.h], numbers[NUMBERS.c0] = KIND.bdf2, h, c0
     numbers[NUMBERS.by_q], numbers[NUMBERS.by_before] = -(1.0 + ratio) / h, ratio * ratio / (1.0 + ratio) / h
     prepare_bdf2(s, h, h1)
+    _guess_end(s, d)
     code, _ = run_stage(m, s, o, clock[CLOCK.t] + h, c0, ratio, True)
     return code == NEWTON.converged and differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.second), c0)
 

@@ -30,8 +30,8 @@ from dms_core.assembly.tables import CALLS, MODEL, WORK
 from dms_core.compiled.arena import floats, indices, inner, ints, matrix, naturals, table_at
 from dms_core.compiled.entries import SLOPES
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.tables import DIFFERENTIALS, MOVEMENT, NUMBERS, Movement
-from dms_core.sensitivity.tables import STAGE as AT
+from dms_core.sensitivity.tangents.tables import DIFFERENTIALS, MOVEMENT, NUMBERS, Movement
+from dms_core.sensitivity.tangents.tables import STAGE as AT
 from dms_core.simulation.iteration.implicit_stage import LOCAL_SHARE
 from dms_core.simulation.iteration.linear_solve import back_substitute, factorise
 from dms_core.simulation.iteration.newton import apply, correction, correction_norm, right_hand_side

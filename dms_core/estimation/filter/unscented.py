@@ -14,10 +14,10 @@ import numpy as np
 import scipy.linalg as la
 
 from dms_core.assembly.model import Model
-from dms_core.estimation.charts import chart_at
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.gaussian import symmetric
-from dms_core.estimation.kalman import Correction, KalmanFilter, Predicted
+from dms_core.estimation.filter.charts import chart_at
+from dms_core.estimation.filter.gaussian import symmetric
+from dms_core.estimation.filter.kalman import Correction, KalmanFilter, Predicted
 from dms_core.estimation.settings import FilterSettings
 
 

@@ -18,7 +18,7 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.tables import CALLS, MODEL, WORK
 from dms_core.compiled.arena import Packed, fields, floats, inner, ints, matrix
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.tables import COLUMNS
+from dms_core.sensitivity.tangents.tables import COLUMNS
 from dms_core.simulation.state import STATE
 
 WEAKEST = 1e-6

@@ -8,9 +8,9 @@ import numpy as np
 
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, SimulationError
-from dms_core.sensitivity.chart import Chart, lift, new_chart
-from dms_core.sensitivity.steps import carry_forward, differentiated_step
-from dms_core.sensitivity.tables import KIND, Columns, new_columns, new_differentials
+from dms_core.sensitivity.tangents.chart import Chart, lift, new_chart
+from dms_core.sensitivity.tangents.steps import carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.tables import KIND, Columns, new_columns, new_differentials
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.parts import restart
 from dms_core.simulation.options import is_positive

@@ -23,12 +23,12 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.errors import SimulationError
-from dms_core.estimation.charts import chart_at, placed
 from dms_core.estimation.estimated import Belief, Estimated
-from dms_core.estimation.gaussian import corrected, gain, is_usable, truncated
-from dms_core.estimation.nominal_world import NominalWorld
+from dms_core.estimation.filter.charts import chart_at, placed
+from dms_core.estimation.filter.gaussian import corrected, gain, is_usable, truncated
+from dms_core.estimation.filter.nominal_world import NominalWorld
+from dms_core.estimation.filter.transition import Transitions, difference_step, in_chart, linear_here
 from dms_core.estimation.settings import FilterSettings
-from dms_core.estimation.transition import Transitions, difference_step, in_chart, linear_here
 
 ITERATIONS, SMALL = 20, 1e-9
 """Corrections of the iterated form, and the last one over the deviations."""

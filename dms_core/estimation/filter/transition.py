@@ -2,8 +2,8 @@
 
     x1 = A x0 + B u        over one period of equal steps of SDIRK2, in the charts at both ends
 
-The steps are solved and differentiated together (sensitivity/steps.py): tangents of x0 and of inputs that are held over
-the period go through every stage in all coordinates, and the charts enter at the two ends only.
+The steps are solved and differentiated together (sensitivity/tangents/steps.py): tangents of x0 and of inputs that are
+held over the period go through every stage in all coordinates, and the charts enter at the two ends only.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 from dms_core.analyses.linearise import Linearisation, linearise
 from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.errors import SimulationError
-from dms_core.estimation.charts import Chart, chart_at
-from dms_core.estimation.nominal_world import FINER, NominalWorld
-from dms_core.sensitivity.steps import carry_forward, differentiated_step
-from dms_core.sensitivity.tables import KIND, Columns, new_columns, new_differentials
+from dms_core.estimation.filter.charts import Chart, chart_at
+from dms_core.estimation.filter.nominal_world import FINER, NominalWorld
+from dms_core.sensitivity.tangents.steps import carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.tables import KIND, Columns, new_columns, new_differentials
 
 
 class Transition(NamedTuple):

@@ -3,8 +3,8 @@
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import floats, indices, ints, matrix, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.tables import ADJOINTS, COLUMNS, DIFFERENTIALS
-from dms_core.sensitivity.tables import STAGE as AT
+from dms_core.sensitivity.tangents.tables import ADJOINTS, COLUMNS, DIFFERENTIALS
+from dms_core.sensitivity.tangents.tables import STAGE as AT
 from dms_core.simulation.iteration.linear_solve import back_substitute, back_substitute_transposed
 
 

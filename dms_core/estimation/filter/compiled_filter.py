@@ -14,13 +14,13 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import Packed, number
 from dms_core.errors import InputError, SimulationError
-from dms_core.estimation.charts import chart_at, chart_with
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.filter_step import CODE, FilterArrays, correct, filter_step, hold_inputs
-from dms_core.estimation.kalman import KalmanFilter
+from dms_core.estimation.filter.charts import chart_at, chart_with
+from dms_core.estimation.filter.filter_step import CODE, FilterArrays, correct, filter_step, hold_inputs
+from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.estimation.settings import FilterSettings
-from dms_core.sensitivity.chart import new_chart
-from dms_core.sensitivity.tables import new_columns, new_differentials
+from dms_core.sensitivity.tangents.chart import new_chart
+from dms_core.sensitivity.tangents.tables import new_columns, new_differentials
 
 WHY = {
     CODE.unsolved: "the equations cannot be solved",

@@ -52,6 +52,8 @@ class Numbers(NamedTuple):
     close: int
     """Relative distance to a converged stage up to which a matrix is taken there. A correction with it leaves the
     square of that; derivatives err by about as much."""
+    known: int
+    """1 where `end_q` and `end_v` hold the end of the step, as it was recorded."""
 
 
 class Kind(NamedTuple):
@@ -103,6 +105,9 @@ class Differentials(NamedTuple):
     """(n_q,)."""
     more: np.ndarray
     """(n_q,)."""
+    end_q: np.ndarray
+    """Where the step is known to end, if numbers[NUMBERS.known] is 1: the guess of its last stage."""
+    end_v: np.ndarray
 
 
 class Columns(NamedTuple):
@@ -208,6 +213,7 @@ def new_differentials(
         scratch=np.zeros((2 * rows + 4, most)),
         movements=np.array([p.table.ctypes.data for p in movements], np.int64), first=stage(), second=stage(),
         numbers=numbers, **vectors, work=storage(lu.work_size), full=np.zeros(n), more=np.zeros(n),
+        end_q=np.zeros(n), end_v=np.zeros(n),
     ))  # fmt: skip
 
 

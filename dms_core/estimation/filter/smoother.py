@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.gaussian import symmetric
-from dms_core.estimation.kalman import KalmanFilter
-from dms_core.estimation.steps import Step
+from dms_core.estimation.filter.gaussian import symmetric
+from dms_core.estimation.filter.kalman import KalmanFilter
+from dms_core.estimation.filter.steps import Step
 
 ROUNDING = 1e-14
 """Eigenvalue of a scaled covariance below which a direction is known exactly."""

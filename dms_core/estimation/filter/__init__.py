@@ -1,0 +1,1 @@
+"""Kalman filters on the constraints, and the smoother."""
