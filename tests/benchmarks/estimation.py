@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.estimation --patients 50 --out docs/elbow_estimation.csv
 
-Patients of `evaluation` do exo/HiddenIntent-v0 in a device that the best tuned classical policy commands. The filter
+Patients of `evaluation` do exo/HiddenIntent-v0 in a device that adaptive gravity compensation commands. The filter
 (`exo_env/estimation`) sees channels of the observation with their noise. Its body is one of average size for everyone,
 its steps are of a fixed size, and neither muscles nor machine are in it; no moment arm of a rope is.
 
@@ -28,7 +28,7 @@ from exo_env.estimation import ElbowEstimator, NominalElbow
 from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, GYRO, RATE, SPECIFIC_FORCE
 
 FIRST_SEED = 30_000
-"""Of the episodes; nothing was tuned on these, nor on this population."""
+"""Of the episodes; no number of the filter was chosen on these."""
 SETTLING = 0.5
 """Part of an episode that is left out, in which the filter finds its start [s]."""
 USUAL_LOAD = 1.25
