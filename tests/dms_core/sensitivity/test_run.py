@@ -70,8 +70,16 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", CASES)
+LONG = {("arm", "radau5"), ("flexible", "radau5")}
+"""Half a minute each, as Radau IIA is differentiated in Python: among the slow tests."""
+RUNS = [
+    pytest.param(name, method, id=f"{name}-{method}", marks=[pytest.mark.slow] * ((name, method) in LONG))
+    for name in CASES
+    for method in METHODS
+]
+
+
+@pytest.mark.parametrize(("name", "method"), RUNS)
 def test_derivatives_equal_differences_over_the_recorded_steps(name, method):
     of, steps = CASES[name]
     rtol = 1e-4 if name == "flexible" else 1e-6
