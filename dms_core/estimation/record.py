@@ -91,7 +91,8 @@ class Estimate:
             *(f"{kind}.{name}" for kind in "qv" for name in layout.names), *self.kalman.estimated.rest_names,
         ]  # fmt: skip
         values, deviations = np.zeros((len(self.beliefs), len(heads))), np.zeros((len(self.beliefs), len(heads)))
-        for k, belief in enumerate(self.beliefs):
+        for k, (belief, step) in enumerate(zip(self.beliefs, self.steps, strict=True)):
+            self.kalman.hold(step.known)
             out = self.kalman.read_out(belief)
             by = np.vstack([out.C, *belief.columns, np.eye(len(belief.P))[belief.chart.size :]])
             # Rates of first-order states belong to the state that was just read.
@@ -171,6 +172,7 @@ def estimate(
         SimulationError: the filter diverged at every reading.
     """
     _check_inputs(kalman, measurements)
+    _hold_declared(kalman, measurements)
     timeline = events(measurements, kalman)
     if not any(event.readings for event in timeline):
         raise InputError(f"measurements: no reading of {', '.join(kalman.settings.channels)} was found.")
@@ -188,6 +190,14 @@ def _check_inputs(kalman: KalmanFilter, measurements: Measurements) -> None:
             raise InputError(f"inputs: '{name}' is estimated, but the measurements tell it; leave one of both out.")
 
 
+def _hold_declared(kalman: KalmanFilter, measurements: Measurements) -> None:
+    """Known inputs as they are declared, until the record tells them."""
+    inputs = kalman.model.system.inputs
+    for name in measurements.inputs:
+        k = kalman.model.layout.input_index[name]
+        kalman.hold({k: float(inputs[k].signal.value)})
+
+
 def _filtered(
     kalman: KalmanFilter, timeline: list[Event], start: Belief | None, progress: Callable[[float], None] | None
 ) -> tuple[list[Step], list[Divergence]]:
@@ -196,6 +206,7 @@ def _filtered(
     steps: list[Step] = []
     diverged: list[Divergence] = []
     good, recent = belief, list[tuple[float, int]]()
+    kalman.hold(timeline[0].inputs)
     for event in timeline:
         try:
             step = _step(kalman, belief, event, bool(steps))
@@ -211,13 +222,13 @@ def _filtered(
             diverged.append(Divergence(event.t, good.t, str(error)))
             wide = replace(good, t=event.t, P=good.P + kalman.estimated.first_covariance(good.chart))
             wide = kalman.moved(wide, wide.mean)
-            step = Step(wide, wide, None, 0.0, 0)
+            step = Step(wide, wide, None, 0.0, 0, dict(kalman.known))
         steps.append(step)
         belief = step.belief
         kalman.hold(event.inputs)
         if progress is not None:
             progress(event.t)
-    if len(diverged) == len(timeline):
+    if diverged and not any(step.readings for step in steps):
         raise SimulationError(f"the filter diverged at every reading. {diverged[0].sentence}")
     return steps, diverged
 
@@ -231,4 +242,4 @@ def _step(kalman: KalmanFilter, belief: Belief, event: Event, moving: bool) -> S
     correction = kalman.correct(here, event.readings)
     if not np.isfinite(correction.nis):
         raise SimulationError("the innovation is not finite")
-    return Step(correction.belief, here, joint, correction.nis, len(correction.residual))
+    return Step(correction.belief, here, joint, correction.nis, len(correction.residual), dict(kalman.known))

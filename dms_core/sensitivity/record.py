@@ -60,7 +60,8 @@ class RecordedWorld(World):
 
     def _keep(self, rows: np.ndarray) -> None:
         if len(rows) and (not self._orders or self._orders[-1][1] is not self._tables):
-            self._orders.append((len(self.times), self._tables))
+            # The step that ends in the first of these rows began at the row before.
+            self._orders.append((max(len(self.times) - 1, 0), self._tables))
         n = 2 * self.model.n_q
         for row in rows:
             k, t = len(self.times), float(row[0])
@@ -79,10 +80,18 @@ class RecordedWorld(World):
         self._forget()
         self.state.counts[COUNTS.restart] = 1
 
+    def mark(self) -> Mark:
+        """As in World, with the length of the record."""
+        return super().mark()._replace(rows=len(self.times))
+
     def rewind(self, past: Mark) -> None:
-        """As in World. The record begins there, and so does the method."""
+        """As in World: the record is cut there, and the method begins afresh."""
         super().rewind(past)
-        self._forget()
+        del self.times[past.rows :]
+        self._kept = {k: x for k, x in self._kept.items() if k < past.rows}
+        self._settings = {k: [s for s in x if s[0] <= past.time] for k, x in self._settings.items()}
+        self._orders = [x for x in self._orders if x[0] < max(past.rows, 1)]
+        self._last = np.array([np.concatenate([self.state.q, self.state.v])] * 2)
         self.state.counts[COUNTS.restart] = 1
 
     @property

@@ -81,7 +81,9 @@ class Sensitivity:
         self.numbers = tuple(dict.fromkeys(x for x in self.by if isinstance(x, Number)))
         self.replay = Replay(record, self.numbers)
         spans = [(x.begin, x.end) if isinstance(x, Shift) else (np.inf, np.inf) for x in self.by]
-        self._begin, self._end = np.array(spans).reshape(-1, 2).T - 1e-12
+        # A shift begins and ends with recorded steps, to the last bit.
+        ends = [[record.times[self._row_at(t)] if np.isfinite(t) else t for t in span] for span in spans]
+        self._begin, self._end = np.array(ends).reshape(-1, 2).T
         self._known: dict[int, Node] = {}
         self._start = start_columns(self.model, self.replay.point(0), self.numbers)
         names, (at, _, _) = self.model.layout.names, self._start
@@ -119,9 +121,6 @@ class Sensitivity:
                 k = self.model.input_index(x.input)
                 if x.input in self.model.layout.driven:
                     raise InputError(f"input '{self.model.system.inputs[k].name}' is driven by an element.")
-                for t in (x.begin, x.end):
-                    if np.isfinite(t):
-                        self._row_at(t)
 
     def _row_at(self, time: float | None) -> int:
         """The row that ends a step at that time, ahead of a jump."""

@@ -1,8 +1,8 @@
 """One step of the extended filter on packed arrays: prediction, correction and projection without a Python object.
 
 The formulas are those of kalman.py. Readings are taken one after the other, which for independent noise is the same
-correction, with Joseph's form P - K c P - (K c P)^T + K S K^T of each. The sensors' derivatives are central differences
-over the columns of the chart, of the rates and multipliers that belong to the displaced states.
+correction, by P - K S K^T of each, which for the best gain is what Joseph's form gives. The sensors' derivatives are
+central differences over the columns of the chart, of the rates and multipliers that belong to the displaced states.
 """
 
 from __future__ import annotations
@@ -188,8 +188,12 @@ def _read(m, s, o, sensing, y):
 def _note_slope(f, k, width):
     """Column k of C from both readings."""
     C, high, low, outputs = matrix(f, FILTER.C), floats(f, FILTER.high), floats(f, FILTER.low), ints(f, FILTER.outputs)
+    turned = ints(f, FILTER.turned)
     for i in range(outputs.shape[0]):
-        C[i, k] = (high[outputs[i]] - low[outputs[i]]) / width
+        rise = high[outputs[i]] - low[outputs[i]]
+        if turned[i] == 1:
+            rise -= 2.0 * math.pi * math.floor(rise / (2.0 * math.pi) + 0.5)
+        C[i, k] = rise / width
 
 
 @compiled

@@ -32,6 +32,8 @@ from dms_core.estimation.settings import FilterSettings
 
 ITERATIONS, SMALL = 20, 1e-9
 """Corrections of the iterated form, and the last one over the deviations."""
+PASSES = 20
+"""Rounds in which bounds are looked at: two or three are enough for two components that are strongly correlated."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,9 @@ class KalmanFilter:
         self.estimated = Estimated(model, settings)
         self._transitions = Transitions(self.world, self.estimated.inputs)
         self._mean = self.estimated.start
-        self._known: dict[int, float] = {}
+        self.known: dict[int, float] = {}
+        """Values of known inputs, by their places."""
+        self._turned = np.array([unit == "rad" for _, unit in model.layout.outputs], bool)
 
     def start(self, t: float = 0.0) -> Belief:
         """The model's assembled start at a time [s], with the covariance of the settings.
@@ -97,19 +101,21 @@ class KalmanFilter:
         """
         start = self.model.start
         chart = chart_at(self.model, start.q, start.v, t)
-        return Belief(
+        belief = Belief(
             t, start.q.copy(), start.v.copy(), self._mean.copy(), chart, self.estimated.first_covariance(chart)
         )
+        # Drivers may have moved since the start was assembled at 0.
+        return self.here(self.moved(belief, belief.mean)) if t > 0.0 else belief
 
     def hold(self, values: dict[int, float]) -> None:
         """Known values of inputs from now on, by their places."""
-        self._known.update(values)
+        self.known.update(values)
 
     def put(self, belief: Belief) -> None:
         """The world at a belief, with its inputs and numbers."""
         self.world.put_numbers(self.estimated.numbers(belief.rest))
         self.world.put(belief.q, belief.v, belief.t)
-        self.world.put_inputs({**self._known, **self.estimated.input_values(belief.rest)})
+        self.world.put_inputs({**self.known, **self.estimated.input_values(belief.rest)})
 
     def predict(self, belief: Belief, t: float) -> Predicted:
         """A belief at a later time [s].
@@ -149,8 +155,8 @@ class KalmanFilter:
         rest = self._mean + self.estimated.factors(t - belief.t) * (belief.rest - self._mean)
         return replace(belief, t=t, q=q, v=v, rest=rest, chart=chart_at(self.model, q, v, t, belief.chart))
 
-    def _by_constant(self, belief: Belief, k: int, value) -> np.ndarray:  # noqa: ANN001
-        """Central difference of value(belief) by constant k, at the same x."""
+    def _by_constant(self, belief: Belief, k: int, value, turned: np.ndarray | bool = False) -> np.ndarray:  # noqa: ANN001
+        """Central difference of value(belief) by constant k, at the same x; of angles that of the nearest turn."""
         place = len(self.estimated.inputs) + k
         h = difference_step(float(belief.rest[place]))
         ends = []
@@ -158,7 +164,7 @@ class KalmanFilter:
             rest = belief.rest.copy()
             rest[place] += sign * h
             ends.append(value(self.moved(belief, np.concatenate([belief.chart.read(belief.q, belief.v), rest]))))
-        return (ends[0] - ends[1]) / (2.0 * h)
+        return nearest(ends[0] - ends[1], turned) / (2.0 * h)
 
     def moved(self, belief: Belief, x: np.ndarray) -> Belief:
         """The belief with another mean (x of the chart, rest), on the constraints; P and chart stay.
@@ -185,7 +191,7 @@ class KalmanFilter:
         C = np.zeros((len(linear.y), n + len(belief.rest)))
         C[:, :n], C[:, n:first] = linear.C @ in_chart(belief.chart, linear), linear.D[:, es.inputs]
         for k in range(len(es.constants)):
-            C[:, first + k] = self._by_constant(belief, k, self.read)
+            C[:, first + k] = self._by_constant(belief, k, self.read, self._turned)
         return Readout(linear.y, C)
 
     def correct(self, belief: Belief, readings: dict[str, float]) -> Correction:
@@ -202,14 +208,14 @@ class KalmanFilter:
         y = np.array([readings[name] for name in names])
         R = np.diag([self.settings.channels[name].variance for name in names])
         result = self._corrected(belief, names, y, R)
-        bounded = self._within_bounds(result.belief)
+        bounded = self.within_bounds(result.belief)
         if not (is_usable(bounded.P) and np.isfinite(bounded.mean).all()):
             raise SimulationError(f"the covariance is not positive definite at t = {belief.t:.6g} s.")
-        return replace(result, belief=replace(bounded, chart=self._chart(bounded)))
+        return replace(result, belief=self.here(bounded))
 
-    def _chart(self, belief: Belief):  # noqa: ANN202
-        """The chart with the same coordinates at the corrected state."""
-        return chart_at(self.model, belief.q, belief.v, belief.t, belief.chart, keep=True)
+    def here(self, belief: Belief) -> Belief:
+        """The belief with the chart of the same coordinates at its own state, where its mean was moved."""
+        return replace(belief, chart=chart_at(self.model, belief.q, belief.v, belief.t, belief.chart, keep=True))
 
     def expected(self, belief: Belief, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
         """What channels should show, and its derivative by (x, rest)."""
@@ -222,9 +228,7 @@ class KalmanFilter:
     def residual(self, names: list[str], y: np.ndarray, expected: np.ndarray) -> np.ndarray:
         """y less what was expected, shape (..., names); of angles the nearest turn."""
         units = dict(self.model.layout.outputs)
-        r = y - expected
-        turned = np.array([units[name] == "rad" for name in names])
-        return np.where(turned, r - 2.0 * np.pi * np.round(r / (2.0 * np.pi)), r)
+        return nearest(y - expected, np.array([units[name] == "rad" for name in names]))
 
     def difference(self, y: np.ndarray, less: np.ndarray) -> np.ndarray:
         """Difference of readings of all channels, shape (k, channels)."""
@@ -236,23 +240,39 @@ class KalmanFilter:
         r = self.residual(names, y, expected)
         found, start = corrected(belief.P, C, R, r), belief.mean
         x, P = start + found.dx, found.P
-        here = self.moved(belief, x)
+        here = self.here(self.moved(belief, x))
         for _ in range(ITERATIONS if self.settings.form == "iterated" else 0):
             expected, C = self.expected(here, names)
             K, _ = gain(belief.P, C, R)
             last, x = x, start + K @ (self.residual(names, y, expected) - C @ (start - x))
             P = corrected(belief.P, C, R, r).P
-            here = self.moved(here, x)
+            here = self.here(self.moved(here, x))
             if np.max(np.abs(x - last) / belief.deviations) < SMALL:
                 break
         return Correction(replace(here, P=P), found.nis, r)
 
-    def _within_bounds(self, belief: Belief) -> Belief:
-        """The belief with what lies outside its bounds cut there."""
+    def within_bounds(self, belief: Belief) -> Belief:
+        """The belief with what lies outside its bounds cut there.
+
+        A cut moves what is correlated, too, perhaps out of bounds that were kept; so all are looked at again. What is
+        outside still behind the last pass is put onto its bound.
+        """
         x, P = belief.mean, belief.P
+        bounds = self.estimated.bounds(belief.chart)
         outside = False
-        for k, low, high in self.estimated.bounds(belief.chart):
-            if not low <= x[k] <= high:
-                dx, P = truncated(P, k, float(x[k]), low, high)
-                x, outside = x + dx, True
+        for _ in range(PASSES):
+            if all(low <= x[k] <= high for k, low, high in bounds):
+                break
+            outside = True
+            for k, low, high in bounds:
+                if not low <= x[k] <= high:
+                    dx, P = truncated(P, k, float(x[k]), low, high)
+                    x = x + dx
+        for k, low, high in bounds:
+            x[k] = min(max(x[k], low), high)
         return replace(self.moved(belief, x), P=P) if outside else belief
+
+
+def nearest(difference: np.ndarray, turned: np.ndarray | bool) -> np.ndarray:
+    """A difference of readings; where `turned`, of angles, that to the nearest turn."""
+    return np.where(turned, difference - 2.0 * np.pi * np.round(difference / (2.0 * np.pi)), difference)

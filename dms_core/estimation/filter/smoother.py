@@ -38,7 +38,7 @@ def _smoothed(kalman: KalmanFilter, filtered: Belief, step: Step, after: Belief)
     ahead = np.concatenate([predicted.chart.read(after.q, after.v), after.rest])
     x = filtered.mean + G @ (ahead - predicted.mean)
     P = symmetric(filtered.P + G @ (after.P - predicted.P) @ G.T)
-    return replace(kalman.moved(filtered, x), P=P)
+    return kalman.here(kalman.within_bounds(replace(kalman.moved(filtered, x), P=P)))
 
 
 def _inverse(P: np.ndarray) -> np.ndarray:

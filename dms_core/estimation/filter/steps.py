@@ -22,3 +22,5 @@ class Step:
     nis: float
     readings: int
     """Number of readings taken."""
+    known: dict[int, float]
+    """Values of known inputs with which the readings were taken, by their places."""

@@ -94,13 +94,14 @@ class StepMap:
         m, s, o = world.tables.table, world.packed.table, world.options.numbers()
         if world.state.counts[COUNTS.restart] and not restart(m, s, o):
             raise SimulationError(f"{self._where()}: no accelerations belong to the state.")
-        n_x, n_u, c = len(self.states), len(self.inputs), self.columns
-        kind = KIND.sdirk2
-        if world.options.method == "bdf2" and not world.state.counts[COUNTS.restart] and world.stats().steps:
-            kind = KIND.bdf2
-        if not lift(m, s, self.chart.table, c.table):
+        if not lift(m, s, self.chart.table, self.columns.table):
             self._renew_chart()
-            return self.step(h)
+            if not lift(m, s, self.chart.table, self.columns.table):
+                raise SimulationError(f"{self._where()}: no coordinates tell the others, as in a singular position.")
+        n_x, n_u, c = len(self.states), len(self.inputs), self.columns
+        # BDF2 needs the tangents of the step before, which a new chart does not have: its first step is one of SDIRK2.
+        past = self.lifted is not None and not world.state.counts[COUNTS.restart] and world.stats().steps
+        kind = KIND.bdf2 if world.options.method == "bdf2" and past else KIND.sdirk2
         self._load(n_x, n_u, kind)
         here = (c.values.dq[:n_x].copy(), c.values.dv[:n_x].copy())
         if not differentiated_step(m, s, o, self.differentials.table, h, kind):

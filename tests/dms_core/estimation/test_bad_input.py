@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, simulate
-from dms_core.errors import InputError, ModelError
+from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.estimation import FilterSettings
 from dms_core.estimation.filter.gaussian import truncated
 from dms_core.estimation.filter.kalman import KalmanFilter
@@ -14,7 +16,7 @@ from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import checked_covariance
 from dms_core.files.config_files import config_file
-from dms_core.model import Constant, Input, LineGuide, Point, PointMass, PositionDriver, System
+from dms_core.model import Constant, Input, LineGuide, LumpedLoad, Point, PointMass, PositionDriver, System
 from dms_core.model_files.model_file import load
 from tests.dms_core.estimation.systems import driven_four_bar, masses
 
@@ -119,6 +121,14 @@ class TestDivergence:
         found = estimate(kalman, Measurements(t, ("at1.position.x",), y[:, None], {}))
         assert "20 corrections in a row" in found.diverged[0].why
 
+    def test_no_reading_that_can_be_told_is_an_error(self):
+        """The rocker is never where the record says; between the readings the filter only predicts."""
+        settings = FilterSettings(channels={"rocker_angle.angle": {"deviation": 1e-6}}, period=0.01)
+        t = 0.05 * np.arange(4)
+        record = Measurements(t, ("rocker_angle.angle",), np.full((4, 1), 0.2), {})
+        with pytest.raises(SimulationError, match="diverged at every reading"):
+            estimate(KalmanFilter(Model(driven_four_bar()), settings), record)
+
 
 class TestBounds:
     def test_a_normal_distribution_cut_at_its_mean_is_half_normal(self):
@@ -152,3 +162,27 @@ class TestBounds:
         force = estimate(KalmanFilter(model, settings), record).rest("input.force")[0]
         assert force.min() >= 0.0
         assert force.max() > 1.0
+
+    def test_a_cut_that_moves_another_input_out_of_its_bounds_is_followed(self):
+        """Two forces on one mass, of which a sensor tells the sum: their errors have a correlation near -1."""
+        both = System(
+            "both", bodies=[PointMass(name="m", mass=1.0)],
+            constraints=[LineGuide(name="track", body_j="m", axis_i=(1.0, 0.0, 0.0))],
+            forces=[LumpedLoad(name=f"push{k}", body="m", force=(1.0, 0.0, 0.0), input=f"f{k}") for k in "ab"],
+            sensors=[Point(name="at", body="m")],
+            inputs=[Input(name=f"f{k}", signal=Constant(value=0.0)) for k in "ab"],
+        )  # fmt: skip
+        settings = FilterSettings(
+            channels={"at.position.x": {"deviation": 1.0}},
+            inputs={f"f{k}": {"deviation": 1.0, "walk": 1.0} for k in "ab"},
+            bounds={f"f{k}": [0.0, None] for k in "ab"},
+        )
+        kalman = KalmanFilter(Model(both), settings)
+        start = kalman.start()
+        P = 0.01 * np.eye(4)
+        P[2, 3] = P[3, 2] = -0.009
+        outside = replace(start, rest=np.array([0.001, -0.05]), P=P)
+        cut = kalman.within_bounds(outside)
+        assert cut.rest.min() >= 0.0
+        # Two passes of truncation, each a closed form of one normal distribution.
+        np.testing.assert_allclose(cut.rest, [0.018, 0.026], atol=1e-3)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dms_core import Model
+from dms_core import Model, SolverOptions, simulate
 from dms_core.errors import InputError
 from dms_core.estimation import Bias, Channel, EstimatedInput, FilterSettings
 from dms_core.estimation.filter.kalman import KalmanFilter
@@ -147,3 +147,18 @@ class TestTimes:
 
     def test_a_quantum_counts_as_noise(self):
         assert Channel(deviation=0.3, quantum=1.2).variance == pytest.approx(0.09 + 0.12)
+
+
+def test_each_row_is_read_with_the_input_that_was_known_then():
+    """A constant moment that ends with the record: accelerations are those that it gave, not those without it."""
+    t = 0.01 * np.arange(11)
+    truth = simulate(driven_four_bar(0.05), 0.1, SolverOptions(rtol=1e-7)).at(t).sensors()
+    known = np.where(t < 0.095, 0.05, 0.0)
+    settings = FilterSettings(channels={"crank_angle.angle": {"deviation": 0.01}}, initial={"position": 1e-4})
+    kalman = KalmanFilter(Model(driven_four_bar()), settings)
+    y = truth["crank_angle.angle"][:, None]
+    record = Measurements(t, ("crank_angle.angle",), y, {"torque": known})
+    found = estimate(kalman, record).columns()["crank_angle.acceleration_rad_per_s2"]
+    size = np.abs(truth["crank_angle.acceleration"]).max()
+    np.testing.assert_allclose(found, truth["crank_angle.acceleration"], atol=0.05 * size)
+    assert estimate(kalman, record).columns()["crank_angle.acceleration_rad_per_s2"] == pytest.approx(found), "no leak"

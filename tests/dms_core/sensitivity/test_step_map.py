@@ -57,6 +57,8 @@ def _end(steps: StepMap, world: World, h: float, change) -> np.ndarray:
     before = world.snapshot()
     change(world.state)
     other = StepMap(world)
+    # A map that knows no step before begins with SDIRK2.
+    other.lifted = steps.lifted
     other.step(h)
     at = steps.chart.values
     x = np.concatenate([world.state.q[at.chosen], world.state.v[at.chosen], world.state.q[at.first]])
@@ -199,3 +201,13 @@ def test_what_cannot_be_mapped_is_refused():
         StepMap(World(model, SolverOptions(method="radau5")))
     with pytest.raises(InputError, match=r"Expected a positive step \[s\], got -1"):
         StepMap(World(model)).step(-1.0)
+
+
+def test_a_map_without_a_past_begins_with_one_step():
+    """A world of BDF2 on its way, of whose step before the map knows nothing."""
+    steps = StepMap(_world("pendulum", "bdf2"))
+    first, second = steps.step(1e-3), steps.step(1e-3)
+    assert not first.A_before.any() and second.A_before.any()
+    # On a slow motion one step of 1 ms changes little: the identity, which BDF2 makes of 4/3 and -1/3.
+    for found in (first.A, second.A + second.A_before):
+        np.testing.assert_allclose(found, np.eye(len(first.states)), atol=0.05)

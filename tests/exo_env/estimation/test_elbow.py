@@ -85,4 +85,5 @@ def test_muscles_and_a_load_cannot_be_told_apart_by_the_device():
     told = {name for name, x in weakest.share.items() if abs(x) > 0.1}
     assert {"input.net", "input.load"} <= told
     # Over 0.1 s at rest nothing but their sum moves the arm.
-    assert weakest.singular_value < 1e-3 * found.directions[0].singular_value
+    np.testing.assert_allclose([d.singular_value for d in found.directions[:-1]], [2200, 790, 210, 150], rtol=0.05)
+    assert weakest.singular_value < 1e-9 * found.directions[0].singular_value
