@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from dms_core.errors import InputError
 from dms_core.files.config_files import config_file
-from dms_core.files.yaml_text import read_yaml
+from dms_core.files.yaml_text import read_yaml, said_of
 from dms_core.validation import Checked, plain, shown
 
 
@@ -35,10 +35,8 @@ class Settings(Checked):
         Raises:
             InputError: the file is missing or wrong; names file, key and value.
         """
-        try:
+        with said_of(path):
             return cls(**read_yaml(path))
-        except InputError as error:
-            raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
     def changed(self, **changes: Any) -> Self:
         """A checked copy with other values; a mapping given for settings within these changes only what it names.

@@ -81,9 +81,33 @@ def independent(model: Model, G: np.ndarray) -> Independent:
     moving = null_space(inner)
     n_z = moving.shape[1]
     pivots = la.qr(moving.T, mode="r", pivoting=True)[1][:n_z] if n_z else np.zeros(0, int)
-    pivots = np.sort(pivots)
-    square = np.vstack([inner[rows], np.eye(len(second))[pivots]])
-    inverse = np.linalg.inv(square)
-    N, L = np.zeros((model.n_q, n_z)), np.zeros((model.n_q, len(rows)))
+    return _with_basis(model, G, second, first, rows, second[np.sort(pivots)])
+
+
+def with_chosen(model: Model, G: np.ndarray, chosen: np.ndarray, rows: np.ndarray | None = None) -> Independent:
+    """The same, of given independent coordinates, and constraint rows where they are given.
+
+    Raises:
+        numpy.linalg.LinAlgError: they do not tell the others there.
+    """
+    second, first = orders(model)
+    if rows is None:
+        rows = independent_rows(G[:, second]).independent if model.n_phi else np.zeros(0, int)
+    return _with_basis(model, G, second, first, rows, chosen)
+
+
+def _with_basis(
+    model: Model, G: np.ndarray, second: np.ndarray, first: np.ndarray, rows: np.ndarray, chosen: np.ndarray
+) -> Independent:
+    """N and L of chosen coordinates."""
+    pick = (second[None, :] == chosen[:, None]).astype(float)
+    inverse = np.linalg.inv(np.vstack([G[rows][:, second], pick]))
+    N, L = np.zeros((model.n_q, len(chosen))), np.zeros((model.n_q, len(rows)))
     L[second], N[second] = inverse[:, : len(rows)], inverse[:, len(rows) :]
-    return Independent(second, first, rows, second[pivots], N, L)
+    return Independent(second, first, rows, chosen, N, L)
+
+
+def state_names(model: Model, chosen: np.ndarray, first: np.ndarray) -> tuple[str, ...]:
+    """'q.<coordinate>', 'v.<coordinate>' of independent coordinates, then 'q.<state>' of first-order states."""
+    names = model.layout.names
+    return (*(f"q.{names[k]}" for k in chosen), *(f"v.{names[k]}" for k in chosen), *(f"q.{names[k]}" for k in first))

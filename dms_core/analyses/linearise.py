@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from dms_core.analyses.independent import Independent, independent
+from dms_core.analyses.independent import Independent, independent, state_names
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
 from dms_core.assembly.derivatives.input_derivatives import STEP
@@ -199,9 +199,7 @@ def linearise(
     cuts = [n_x, n_x + n_u, n_x + 2 * n_u]
     A, B, B_rate, B_acceleration = np.split(dx, cuts, axis=1)
     C, D, D_rate, D_acceleration = np.split(dy, cuts, axis=1)
-    names = model.layout.names
-    states = (*(f"q.{names[k]}" for k in at.chosen), *(f"v.{names[k]}" for k in at.chosen),
-              *(f"q.{names[k]}" for k in at.first))  # fmt: skip
+    states = state_names(model, at.chosen, at.first)
     return Linearisation(
         model, point, A, B, B_rate, B_acceleration, C, D, D_rate, D_acceleration, s.y,
         states, tuple(model.layout.input_index), tuple(model.layout.outputs),

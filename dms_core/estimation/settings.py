@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dms_core.errors import InputError
-from dms_core.files.yaml_text import read_yaml
+from dms_core.files.yaml_text import read_yaml, said_of
 from dms_core.validation import Checked
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -128,10 +128,8 @@ class FilterSettings(Checked):
         Raises:
             InputError: the file is missing or wrong; names file, key and value.
         """
-        try:
+        with said_of(path):
             return cls(**read_yaml(path))
-        except InputError as error:
-            raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
 
 ASYMMETRY = 1e-9

@@ -11,6 +11,8 @@ Files that rl_zoo3 reads too are `portable`: a scalar that YAML 1.1 reads otherw
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -44,6 +46,15 @@ def read_yaml(path: str | Path, *, portable: bool = False) -> Section:
     slow = portable or FAST is yaml.SafeLoader
     content = read_bytes(path, MOST_PORTABLE if slow else MOST_BYTES)
     return parse_yaml(decoded(path, content), path, portable=portable)
+
+
+@contextmanager
+def said_of(path: str | Path) -> Iterator[None]:
+    """Name the file in an InputError about what it holds, where the error does not."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
 
 def parse_yaml(text: str, path: str | Path, *, portable: bool = False) -> Section:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dms_core.analyses.independent import state_names
 from dms_core.errors import InputError, ModelWarning, choices
 from dms_core.model.contact.contact import Contact
 from dms_core.sensitivity.nodes import Node, Number, node, start_columns
@@ -86,9 +87,8 @@ class Sensitivity:
         self._begin, self._end = np.array(ends).reshape(-1, 2).T
         self._known: dict[int, Node] = {}
         self._start = start_columns(self.model, self.replay.point(0), self.numbers)
-        names, (at, _, _) = self.model.layout.names, self._start
-        self.states = (*(f"q.{names[k]}" for k in at.chosen), *(f"v.{names[k]}" for k in at.chosen),
-                       *(f"q.{names[k]}" for k in at.first))  # fmt: skip
+        at = self._start[0]
+        self.states = state_names(self.model, at.chosen, at.first)
         for output in self.of:
             if not self._is_state(output):
                 self._sensor(output)

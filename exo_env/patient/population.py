@@ -34,7 +34,7 @@ from pydantic import Field, model_validator
 
 from dms_core.errors import InputError, choices
 from dms_core.files.config_files import configs
-from dms_core.files.yaml_text import read_yaml
+from dms_core.files.yaml_text import read_yaml, said_of
 from dms_core.validation import cut, shown
 from exo_env.ecosystem.person import SEXES
 from exo_env.patient.distributions import Choice, Constant, Distribution, Draws, distribution, weighted
@@ -87,13 +87,11 @@ class Population(Settings):
         Raises:
             InputError: the file is missing or wrong; names file, key and value.
         """
-        try:
+        with said_of(path):
             found = read_yaml(path)
             if found and not found.keys() & cls.model_fields.keys():
                 return cls(title=Path(path).stem, fields=Patient(**found).model_dump())
             return cls(**found)
-        except InputError as error:
-            raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
     @cached_property
     def parts(self) -> tuple[Population, ...]:

@@ -11,13 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 
-from dms_core.analyses.independent import orders
+from dms_core.analyses.independent import Independent, independent, state_names, with_chosen
 from dms_core.assembly.model import Model
 from dms_core.errors import SimulationError
-from dms_core.linear.null_space import null_space
-from dms_core.linear.rank import independent_rows
 
 CLOSED, ITERATIONS = 1e-13, 20
 """Largest |phi| left by a projection, over the sizes of the coordinates, and its iterations."""
@@ -52,10 +49,8 @@ class Chart:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """'q.<coordinate>', 'v.<coordinate>' of independent coordinates, then 'q.<state>' of first-order ones."""
-        names = self.model.layout.names
-        return (*(f"q.{names[k]}" for k in self.chosen), *(f"v.{names[k]}" for k in self.chosen),
-                *(f"q.{names[k]}" for k in self.first))  # fmt: skip
+        """Names of x."""
+        return state_names(self.model, self.chosen, self.first)
 
     def read(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """x of a state, or of displacements as columns: shape (n_x, ...)."""
@@ -76,49 +71,30 @@ def chart_at(
         ModelError: a constraint reads a first-order state.
     """
     _, _, G, W = model.constraint_jacobian(q, v, t)
-    second, first = orders(model)
     if like is not None:
         try:
-            chart = _with_basis(model, second, first, like.rows, like.chosen, G, W)
+            chart = _chart(model, with_chosen(model, G, like.chosen, like.rows), W)
             if keep or not chart.steep:
                 return chart
         except np.linalg.LinAlgError:
             pass
-    inner = G[:, second]
-    rows = independent_rows(inner).independent if model.n_phi else np.zeros(0, int)
-    chosen = second[_best(null_space(inner))]
-    return _with_basis(model, second, first, rows, chosen, G, W)
+    return _chart(model, independent(model, G), W)
 
 
 def chart_with(model: Model, q: np.ndarray, v: np.ndarray, t: float, chosen: np.ndarray) -> Chart:
     """The chart of given independent coordinates at a state."""
     _, _, G, W = model.constraint_jacobian(q, v, t)
-    second, first = orders(model)
-    rows = independent_rows(G[:, second]).independent if model.n_phi else np.zeros(0, int)
-    return _with_basis(model, second, first, rows, chosen, G, W)
+    return _chart(model, with_chosen(model, G, chosen), W)
 
 
-def _best(motions: np.ndarray) -> np.ndarray:
-    """Coordinates whose motions are told apart best, by QR with column pivoting, shape (n_z,)."""
-    n = motions.shape[1]
-    return np.sort(la.qr(motions.T, mode="r", pivoting=True)[1][:n]) if n else np.zeros(0, int)
-
-
-def _with_basis(
-    model: Model, second: np.ndarray, first: np.ndarray, rows: np.ndarray, chosen: np.ndarray, G: np.ndarray,
-    W: np.ndarray,
-) -> Chart:  # fmt: skip
-    """The chart of chosen coordinates."""
-    n_z, n_f = len(chosen), len(first)
-    pick = (second[None, :] == chosen[:, None]).astype(float)
-    inverse = np.linalg.inv(np.vstack([G[rows][:, second], pick]))
-    N, L = np.zeros((model.n_q, n_z)), np.zeros((model.n_q, len(rows)))
-    L[second], N[second] = inverse[:, : len(rows)], inverse[:, len(rows) :]
+def _chart(model: Model, at: Independent, W: np.ndarray) -> Chart:
+    """The chart of independent coordinates where (phi_q v)_q is W."""
+    n_z, n_f = len(at.chosen), len(at.first)
     dq, dv = np.zeros((model.n_q, 2 * n_z + n_f)), np.zeros((model.n_q, 2 * n_z + n_f))
-    dq[:, :n_z], dv[:, n_z : 2 * n_z] = N, N
-    dv[:, :n_z] = -L @ (W[rows] @ N)
-    dq[first, 2 * n_z + np.arange(n_f)] = 1.0
-    return Chart(model, chosen, first, rows, N, L, dq, dv)
+    dq[:, :n_z], dv[:, n_z : 2 * n_z] = at.N, at.N
+    dv[:, :n_z] = -at.L @ (W[at.rows] @ at.N)
+    dq[at.first, 2 * n_z + np.arange(n_f)] = 1.0
+    return Chart(model, at.chosen, at.first, at.rows, at.N, at.L, dq, dv)
 
 
 def placed(chart: Chart, x: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +110,7 @@ def placed(chart: Chart, x: np.ndarray, q: np.ndarray, v: np.ndarray, t: float) 
     here = chart
     for _ in range(ITERATIONS):
         phi, _, G, W = model.constraint_jacobian(q, v, t)
-        here = _with_basis(model, *orders(model), here.rows, here.chosen, G, W)
+        here = _chart(model, with_chosen(model, G, here.chosen, here.rows), W)
         if not np.isfinite(q).all() or not np.abs(here.N).max(initial=0.0) < np.inf:
             break
         if np.abs(phi[here.rows]).max(initial=0.0) <= CLOSED * size:

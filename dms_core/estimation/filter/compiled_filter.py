@@ -63,16 +63,16 @@ class CompiledFilter:
         own = self._in_own_chart(belief)
         n_x, n, n_c = own.chart.size, len(own.P), len(self.names)
         n_y, n_q = len(model.layout.outputs), model.n_q
-        units, rest = dict(model.layout.outputs), list(es.rest_names)
-        places = np.array(es.inputs, np.int64)
+        rest, places = list(es.rest_names), np.array(es.inputs, np.int64)
+        outputs = np.array([es.outputs[name] for name in self.names], np.int64)
         self.arrays = FilterArrays(
             rest=own.rest.copy(), mean=es.start, factor=es.factors(period), Q=es.noise(own.chart, period),
             P=own.P.copy(), A=np.zeros((n, n)), half=np.zeros((n, n)),
             rows=np.array([world.state.signals.ptr[k] for k in es.inputs], np.int64), places=places,
-            outputs=np.array([es.outputs[name] for name in self.names], np.int64),
+            outputs=outputs,
             R=np.array([settings.channels[name].variance for name in self.names]),
             bias=np.array([rest.index(f"bias.{x}") if x in es.biased else -1 for x in self.names], np.int64),
-            turned=np.array([int(units[name] == "rad") for name in self.names], np.int64), C=np.zeros((n_c, n)),
+            turned=self.kalman.turned[outputs].astype(np.int64), C=np.zeros((n_c, n)),
             y=np.zeros(n_y), high=np.zeros(n_y), low=np.zeros(n_y), expected=np.zeros(n_c),
             reading=np.full(n_c, np.nan), x=np.zeros(n), gain=np.zeros(n), q=np.zeros(n_q), v=np.zeros(n_q),
             period=np.array([period, float(settings.steps)]), nis=np.zeros(2),

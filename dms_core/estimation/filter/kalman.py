@@ -91,7 +91,8 @@ class KalmanFilter:
         self._mean = self.estimated.start
         self.known: dict[int, float] = {}
         """Values of known inputs, by their places."""
-        self._turned = np.array([unit == "rad" for _, unit in model.layout.outputs], bool)
+        self.turned = np.array([unit == "rad" for _, unit in model.layout.outputs], bool)
+        """Whether each sensor component is an angle, of which the nearest turn counts, shape (n_y,)."""
 
     def start(self, t: float = 0.0) -> Belief:
         """The model's assembled start at a time [s], with the covariance of the settings.
@@ -191,7 +192,7 @@ class KalmanFilter:
         C = np.zeros((len(linear.y), n + len(belief.rest)))
         C[:, :n], C[:, n:first] = linear.C @ in_chart(belief.chart, linear), linear.D[:, es.inputs]
         for k in range(len(es.constants)):
-            C[:, first + k] = self._by_constant(belief, k, self.read, self._turned)
+            C[:, first + k] = self._by_constant(belief, k, self.read, self.turned)
         return Readout(linear.y, C)
 
     def correct(self, belief: Belief, readings: dict[str, float]) -> Correction:
@@ -227,8 +228,7 @@ class KalmanFilter:
 
     def residual(self, names: list[str], y: np.ndarray, expected: np.ndarray) -> np.ndarray:
         """y less what was expected, shape (..., names); of angles the nearest turn."""
-        units = dict(self.model.layout.outputs)
-        return nearest(y - expected, np.array([units[name] == "rad" for name in names]))
+        return nearest(y - expected, self.turned[[self.estimated.outputs[name] for name in names]])
 
     def difference(self, y: np.ndarray, less: np.ndarray) -> np.ndarray:
         """Difference of readings of all channels, shape (k, channels)."""

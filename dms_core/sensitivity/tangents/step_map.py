@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dms_core.analyses.independent import state_names
 from dms_core.compiled.arena import Packed
 from dms_core.errors import InputError, SimulationError
 from dms_core.sensitivity.tangents.chart import Chart, lift, new_chart
@@ -72,9 +73,7 @@ class StepMap:
         model, world = self.world.model, self.world
         self.chart: Packed = new_chart(model, world.state.q, world.time)
         at: Chart = self.chart.values
-        names = model.layout.names
-        self.states = (*(f"q.{names[k]}" for k in at.chosen), *(f"v.{names[k]}" for k in at.chosen),
-                       *(f"q.{names[k]}" for k in at.first))  # fmt: skip
+        self.states = state_names(model, at.chosen, at.first)
         self.columns = new_columns(model, 2 * len(self.states) + 3 * len(self.inputs))
         self.lifted: tuple[np.ndarray, np.ndarray] | None = None
         """dq and dv of each state at the begin of the last step, shape (n_x, n_q) twice."""
