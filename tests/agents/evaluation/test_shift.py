@@ -78,6 +78,7 @@ def test_the_hinge_is_where_the_label_says():
     assert sum(x**2 for x in offset) ** 0.5 == pytest.approx(0.03)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_row_a_size_and_policy(tmp_path, capsys):
     out = tmp_path / "run"
     command = ["shift", "--policy", "gravity", "--shifts", "sensor_delay", "load", "--patients", "2", "--out", str(out)]
