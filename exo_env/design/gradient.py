@@ -12,6 +12,7 @@ affinely, as an attachment point does, they are exact up to rounding; the gains,
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -109,9 +110,13 @@ class Trial:
         outputs = objective.outputs(self.ropes, self.times)
         return objective.of(self.ropes, Sensitivity(self.record, outputs, []).value())[0]
 
+    @cached_property
+    def _slopes(self) -> Slopes:
+        return slopes(self.wearer, self.space, self.x, self.model)
+
     def gradient(self, objective: Objective) -> tuple[float, np.ndarray]:
         """J of the run, and its gradient by the numbers of the design, shape (n,)."""
-        s = slopes(self.wearer, self.space, self.x, self.model)
+        s = self._slopes
         outputs, n_p = objective.outputs(self.ropes, self.times), len(s.numbers)
         states = Sensitivity(self.record, [], []).states
         run = Sensitivity(self.record, outputs, [*s.numbers, *(Start(name) for name in states)])

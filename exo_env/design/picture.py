@@ -11,7 +11,7 @@ import numpy as np
 from dms_core.figures import drawn
 from exo_env.design.space import Design
 from exo_env.ecosystem.exoskeleton import LEAST_ANGLE, MOST_ANGLE
-from exo_env.rendering.panels import COLOURS, legend, literal, panels, save
+from exo_env.rendering.panels import COLOURS, legend, literal, note, panels, save
 from exo_env.rendering.shapes import limb
 
 SHOWN = 60.0
@@ -37,11 +37,13 @@ def draw(path: Path, today: Design, found: Design) -> Path:
         ax.set_title(title, fontsize=10)
     _levers(axes[0, 2], today, found)
     ends = np.concatenate([_ends(d, r) for d in (today, found) for r in d.device.ropes])
-    low, high = np.minimum(ends.min(axis=0), -0.08) - 0.03, np.maximum(ends.max(axis=0), 0.24) + 0.03
+    low, high = np.minimum(ends.min(axis=0), -0.08) - 0.12, np.maximum(ends.max(axis=0), 0.24) + 0.05
     for ax in axes[0, :2]:
-        ax.set(xlim=(low[0], high[0]), ylim=(low[1] - 0.08, high[1]), xlabel="forward [m]", aspect="equal")
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="forward [m]", aspect="equal")
     axes[0, 0].set_ylabel("up, along the upper arm [m]")
     legend(figure, 4)
+    said = "Dotted: in a and b the ropes of the other device, in c those of today's."
+    note(figure, [f"{said} Numbers are x and y [mm] in the link that holds the end."])
     return save(figure, path)
 
 
@@ -54,6 +56,7 @@ def _ends(design: Design, rope: str) -> np.ndarray:
 def _device(ax: Any, design: Design, other: Design) -> None:
     """Arm, links and ropes; where the other device has its ropes, thin lines."""
     elbow = np.zeros(2)
+    ax.set_axisbelow(True)
     for outline in (
         limb(np.array([0.0, HUMERUS]), elbow, 0.045, 0.038),
         limb(elbow, turned((0.0, -FOREARM, 0.0)), 0.036, 0.024),
@@ -65,17 +68,16 @@ def _device(ax: Any, design: Design, other: Design) -> None:
     ax.plot(*elbow, "o", color="0.35", markersize=6, zorder=4, label="hinge")
     for k, rope in enumerate(design.device.ropes):
         colour, ends = COLOURS[k % len(COLOURS)], _ends(design, rope)
-        for end in ends:
-            if np.hypot(*end) < 0.12:
-                ax.plot(*np.array([elbow, end]).T, color="0.55", linewidth=1.5, zorder=1)
+        ax.plot(*np.array([elbow, ends[1]]).T, color="0.55", linewidth=1.5, zorder=1)
         ax.plot(*_ends(other, rope).T, ":", color=colour, linewidth=1.0, zorder=2)
         ax.plot(*ends.T, "-o", color=colour, linewidth=2, markersize=5, zorder=5, label=literal(f"rope '{rope}'"))
-        for word, end in zip(("upper", "lower"), ends, strict=True):
+        sides = (1.0, "left") if k == 0 else (-1.0, "right")
+        for point, end in zip((design.device.ropes[rope].upper, design.device.ropes[rope].lower), ends, strict=True):
+            # Adding 0 keeps a minus from a rounded nothing.
+            x, y = (round(1e3 * value) + 0 for value in point[:2])
             ax.annotate(
-                f"{word}\n({1e3 * design.device.ropes[rope].model_dump()[word][0]:.0f}, "
-                f"{1e3 * design.device.ropes[rope].model_dump()[word][1]:.0f}) mm",
-                end, xytext=(8.0 if k == 0 else -8.0, 4.0), textcoords="offset points", fontsize=7, color=colour,
-                ha="left" if k == 0 else "right", zorder=6,
+                f"({x}, {y})", end, xytext=(7.0 * sides[0], 5.0), textcoords="offset points", fontsize=7, color=colour,
+                ha=sides[1], zorder=6, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.7},
             )  # fmt: skip
 
 
@@ -87,5 +89,5 @@ def _levers(ax: Any, today: Design, found: Design) -> None:
             arm = [1e3 * design.device.moment_arm(rope, math.radians(a)) for a in angles]
             ax.plot(angles, arm, style, color=COLOURS[k % len(COLOURS)], linewidth=1.8 if style == "-" else 1.2)
     ax.axhline(0.0, color="0.7", linewidth=0.8)
-    ax.set_title("moment arms: today dotted, found solid", fontsize=10)
+    ax.set_title("moment arms of the ropes", fontsize=10)
     ax.set(xlabel="hinge angle [deg]", ylabel="moment arm, flexion positive [mm]")

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from dms_core import SolverOptions
-from dms_core.errors import InputError, SimulationError
+from dms_core.errors import DmsError, SimulationError
 from exo_env.design.gradient import Trial
 from exo_env.design.objectives import Objective
 from exo_env.design.space import DesignSpace
@@ -108,7 +108,7 @@ def _tried(
     found.evaluations += 1
     try:
         value, slope = mean(x)
-    except (SimulationError, InputError) as error:
+    except DmsError as error:
         found.refused.append(str(error))
         return np.inf, np.zeros(len(x))
     if value < found.value:

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from dms_core import Model
+from dms_core.errors import SimulationError
 from dms_core.model import RopeSensor, Spline, System
 from dms_core.model.muscles.activation import MINIMUM
 from exo_env.design.space import Design
@@ -54,8 +55,6 @@ class Wearer:
         setting: what is the same for all patients.
         like: a wearer whose orders of elimination are taken over where the structure is the same.
 
-    Raises:
-        SimulationError: the patient's command does not settle.
     """
 
     def __init__(self, name: str, patient: Patient, setting: Setting, like: Wearer | None = None) -> None:
@@ -73,7 +72,10 @@ class Wearer:
         e = self._ecosystem
         assert e.machine is not None
         expected = e.weight * self.patient.expected_load
-        return plan(InternalModel.of(e.arm(), e.machine, expected), self.exercise.course, self.exercise.duration)
+        try:
+            return plan(InternalModel.of(e.arm(), e.machine, expected), self.exercise.course, self.exercise.duration)
+        except SimulationError as error:
+            raise SimulationError(f"{self.name}: {error}") from None
 
     @cached_property
     def _excitations(self) -> dict[str, Spline]:
@@ -84,7 +86,11 @@ class Wearer:
         return {m: Spline(times=times, values=tuple(scaled[:, k])) for k, m in enumerate(self._command.muscles)}
 
     def system(self, design: Design) -> System:
-        """The patient in a device, with sensors of all that objectives need."""
+        """The patient in a device, with sensors of all that objectives need.
+
+        Raises:
+            SimulationError: the patient's command does not settle.
+        """
         worn = self._ecosystem.changed(device=design.device, cuff=design.cuff)
         declared = worn.system(
             float(np.radians(self.exercise.angles_deg[0])),
