@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from dms_core import SolverOptions
+from dms_core.analyses.commands.ending import gave_up
 from dms_core.command_line import FAILED_RUN, FolderOut
 from dms_core.errors import InputError, SimulationError, Stopped
 from dms_core.figures import require_matplotlib
@@ -96,8 +97,7 @@ def design(
             named = [("designed on", who[:patients]), ("held out", who[patients:])]
             groups = [compared(name, w, today, better, options, _say) for name, w in named if w]
         except SimulationError as error:
-            print(f"failed: {error}")
-            return FAILED_RUN
+            return gave_up(error)
         write_text(out / "design.csv", table(groups))
         _draw(out, today, better)
     print("\n".join(_report(space, found, lowered.unit, groups)))

@@ -5,9 +5,9 @@ A number x of a design moves several declared numbers p of the system, and may m
     dJ/dx = sum_p dJ/dp dp/dx + sum_z dJ/dz dz/dx
 
 dJ/dp and dJ/dz come by adjoints of the recorded run (dms_core.sensitivity), all from one way back. dp/dx and dz/dx are
-central differences of declarations and of their assembled starts; nothing is simulated for them. Where p depends on x
-affinely, as an attachment point does, they are exact up to rounding; the gains, which go with 1 / lever, are so to
-1e-8, and so is an assembled start.
+differences of declarations and of their assembled starts, of the second order and one-sided at a bound; nothing is
+simulated for them. Where p depends on x affinely, as an attachment point does, they are exact up to rounding; the
+gains, which go with 1 / lever, are so to 1e-8, and so is an assembled start.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from exo_env.design.wearer import Wearer, exercise_times
 INTERVAL = 0.05
 """Time between the samples of a run that an objective sees [s]; a movement of two seconds has its peak for longer."""
 STEP = 1e-4
-"""Half the difference of designs, as a part of the width of their bounds: of attachment points, micrometres."""
+"""Step of these differences, as a part of the width of the bounds: of attachment points, micrometres."""
 
 
 class Slopes(NamedTuple):
@@ -63,16 +63,35 @@ def slopes(wearer: Wearer, space: DesignSpace, x: np.ndarray, model: Model) -> S
     """
     moved: dict[Number, np.ndarray] = {}
     start = np.zeros((2 * model.n_q, len(x)))
-    for k, step in enumerate(STEP * (space.high - space.low)):
-        models = [wearer.model(space.design(x + sign * step * np.eye(len(x))[k])) for sign in (1.0, -1.0)]
-        high, low = (np.concatenate([m.start.q, m.start.v]) for m in models)
-        start[:, k] = (high - low) / (2.0 * step)
-        above, below = (declared_numbers(m.system) for m in models)
-        for number in above.keys() & below.keys():
-            if above[number] != below[number]:
-                moved.setdefault(number, np.zeros(len(x)))[k] = (above[number] - below[number]) / (2.0 * step)
+    for k in range(len(x)):
+        nearby = [(weight, _moved(wearer, space, x, k, step, model)) for step, weight in _stencil(space, x, k)]
+        start[:, k] = sum(weight * np.concatenate([m.start.q, m.start.v]) for weight, m in nearby)
+        declared = [(weight, declared_numbers(m.system)) for weight, m in nearby]
+        for number in declared[0][1]:
+            values = [numbers[number] for _, numbers in declared]
+            if any(value != values[0] for value in values):
+                slope = sum(weight * value for (weight, _), value in zip(declared, values, strict=True))
+                moved.setdefault(number, np.zeros(len(x)))[k] = slope
     read = [number for number in sorted(moved) if _is_read(model, number)]
     return Slopes(tuple(read), np.array([moved[p] for p in read]).reshape(len(read), len(x)), start)
+
+
+def _stencil(space: DesignSpace, x: np.ndarray, k: int) -> list[tuple[float, float]]:
+    """Steps from number k of a design and their weights in a difference of the second order that keeps the bounds."""
+    h = STEP * (space.high[k] - space.low[k])
+    if space.low[k] <= x[k] - h and x[k] + h <= space.high[k]:
+        return [(h, 0.5 / h), (-h, -0.5 / h)]
+    inwards = h if x[k] - h < space.low[k] else -h
+    return [(0.0, -1.5 / inwards), (inwards, 2.0 / inwards), (2.0 * inwards, -0.5 / inwards)]
+
+
+def _moved(wearer: Wearer, space: DesignSpace, x: np.ndarray, k: int, step: float, model: Model) -> Model:
+    """The wearer's model where number k of a design is moved."""
+    if step == 0.0:
+        return model
+    there = x.copy()
+    there[k] += step
+    return wearer.model(space.design(there))
 
 
 def _is_read(model: Model, number: Number) -> bool:

@@ -66,7 +66,7 @@ def test_a_run_that_fails_today_is_a_sentence(tiny, capsys, monkeypatch):
 
     monkeypatch.setattr("exo_env.design.search.mean_gradient", fails)
     assert main(tiny) == 1
-    assert "failed: patient 1: no." in capsys.readouterr().out
+    assert "The analysis failed: patient 1: no." in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

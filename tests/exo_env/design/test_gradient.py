@@ -93,3 +93,23 @@ def test_the_map_from_design_to_declared_numbers_is_explicit():
     # The gains fall with the lever.
     assert found.by_design[names.index("pid.kp"), 0] < 0.0 == found.by_design[names.index("pid.kp"), 1]
     assert not found.start.any(), "an aligned device starts where the elbow is"
+
+
+def test_at_its_bounds_the_map_is_the_same_and_asks_for_nothing_beyond():
+    """A stiffness of 0 is allowed, one below is not; and a lever may end where its rope would pull the other way."""
+    inside = space(cuff=True, bounds={"cuff.stiffness.1": (0.0, 4000.0), "ropes.agonist.lower.0": (0.005, 0.06)})
+    wearer = few(1, cuff=True)[0]
+    for x in (inside.low, inside.high):
+        model = wearer.model(inside.design(x))
+        at = slopes(wearer, inside, x, model)
+        # Of second order over micrometres of 7 cm.
+        for number, row in zip(at.numbers, at.by_design, strict=True):
+            if number.element == "pid":
+                assert row[1] == pytest.approx(_gain_slope(inside, x, number.path), rel=1e-6)
+        assert ("guide", "stiffness.1") in at.numbers
+
+
+def _gain_slope(designs, x, gain) -> float:
+    """d gain / d lower.0 by differences of the device itself."""
+    devices = [designs.design(x + np.array([0.0, h])).device for h in (1e-5, -1e-5)]
+    return (getattr(devices[0].gains, gain) - getattr(devices[1].gains, gain)) / 2e-5
