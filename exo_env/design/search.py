@@ -94,7 +94,7 @@ def search(
     try:
         minimize(
             scaled, (space.start - space.low) / width, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(width),
-            callback=tell, options={"maxiter": iterations, "ftol": GAIN, "maxls": 10},
+            callback=tell, options={"maxiter": iterations, "ftol": GAIN, "maxls": 5},
         )  # fmt: skip
     except KeyboardInterrupt:
         found.stopped = True
