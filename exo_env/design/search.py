@@ -1,6 +1,7 @@
 """The search for a better design: L-BFGS-B within bounds, on the mean objective of some wearers.
 
-Variables are scaled so that the bounds are 0 and 1, and the objective by its value today. A design in which a run
+Variables are scaled so that the bounds are 0 and 1, and the objective so that the first step, which is that of steepest
+descent, has FIRST_STEP as its longest part, whether an objective is sensitive or hardly so. A design in which a run
 fails, or that no device can have, is not acceptable: it counts as REFUSED times today's value with no slope, so that
 the line search turns back. The best design so far is kept whatever happens.
 """
@@ -24,6 +25,8 @@ from exo_env.design.wearer import Wearer
 
 REFUSED = 10.0
 """Times today's value that a design counts which is not acceptable."""
+FIRST_STEP = 0.25
+"""Longest part of the first step, as a part of the width of the bounds."""
 GAIN = 1e-4
 """Relative gain of an iteration below which the search ends; runs err by less."""
 
@@ -74,6 +77,11 @@ def search(
     if value == 0.0:
         raise SimulationError(f"{objective.title}: it is 0 in today's design; there is nothing to lower.")
     found = Found(space.start.copy(), value, value, 1)
+    begin = (space.start - space.low) / width
+    downhill = np.clip(begin - slope * width, 0.0, 1.0) - begin
+    if not downhill.any():
+        return found
+    scale = FIRST_STEP / np.abs(slope * width)[downhill != 0.0].max()
     # The optimiser begins with today's design, which is known.
     known, counter = [(value, slope)], count(1)
 
@@ -81,8 +89,8 @@ def search(
         now, by = known.pop() if known else _tried(found, mean, np.clip(space.low + width * u, space.low, space.high))
         if now == np.inf:
             say(f"not acceptable: {found.refused[-1]}")
-            return REFUSED, np.zeros(len(u))
-        return now / found.start, by * width / found.start
+            return REFUSED * scale * found.start, np.zeros(len(u))
+        return scale * now, scale * by * width
 
     def tell(u: np.ndarray) -> None:
         change = 100.0 * (found.value / found.start - 1.0)
@@ -93,8 +101,8 @@ def search(
 
     try:
         minimize(
-            scaled, (space.start - space.low) / width, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(width),
-            callback=tell, options={"maxiter": iterations, "ftol": GAIN, "maxls": 5},
+            scaled, begin, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(width),
+            callback=tell, options={"maxiter": iterations, "ftol": GAIN * min(1.0, scale * value), "maxls": 5},
         )  # fmt: skip
     except KeyboardInterrupt:
         found.stopped = True

@@ -12,8 +12,8 @@ TIGHT = SolverOptions(rtol=1e-7)
 PART = 0.02
 """Step of the differences, as a part of the width of the bounds: a millimetre of 6 cm."""
 TOLERANCE = 2e-5
-"""Of the objective, and of its largest derivative. Runs choose their steps anew in each design and err by rtol = 1e-7 of
-an objective, which over PART is 5e-6 of it, four runs together; the differences, of the fourth order, err by less."""
+"""Of the objective, and of its largest derivative. Runs choose their steps anew in each design and err by rtol = 1e-7
+of an objective, which over PART is 5e-6 of it, four runs together; differences of the fourth order err by less."""
 LOWERING = {"times": [0.0, 0.1], "angles_deg": [55.0, 50.0], "duration": 0.15, "proprioception": {}}
 """A jerk downwards in which first the antagonist pulls and then the agonist, so that the ends of both ropes count."""
 CASES = {"rigid": (ALIGNED, False), "askew": (ASKEW, False), "compliant": (ALIGNED, True)}
