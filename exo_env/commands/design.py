@@ -140,7 +140,9 @@ def _report(space: DesignSpace, found: Found, unit: str, groups: Sequence[Compar
     lines = [f"{'number':28}{'today':>12}{'found':>12}{'least':>12}{'largest':>12}"]
     for k, name in enumerate(space.names):
         numbers = (space.start[k], found.x[k], space.low[k], space.high[k])
-        lines.append(f"{name:28}" + "".join(f"{x:12.5g}" for x in numbers) + ("  at its bound" if name in at else ""))
+        # Adding 0 keeps a minus from a rounded nothing.
+        shown = "".join(f"{round(float(x), 7) + 0.0:12.5g}" for x in numbers)
+        lines.append(f"{name:28}{shown}" + ("  at its bound" if name in at else ""))
     change = 100.0 * (found.value / found.start - 1.0)
     return [
         *lines, "",
