@@ -2,9 +2,11 @@
 
 A name is the way to a number in the device's file, as 'ropes.agonist.lower.1' or 'guide_distance'; numbers of the
 compliant cuff follow 'cuff.', as 'cuff.stiffness.0'. Where the lever of the lifting rope changes, so do the gains of
-the controllers: Ziegler and Nichols' critical gain keeps Kc r (paper/tuning.py), so that
+the controllers, by the formula for Kc r in paper/tuning.py, which holds inertia and damping:
 
     kp, ki, kd, Kc  =  those of today's device  x  r_today / r,       r at 60 degrees
+
+That is a rule in place of a tuning; `python -m exo_env tune` does that for a device that is kept.
 """
 
 from __future__ import annotations
