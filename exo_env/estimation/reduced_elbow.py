@@ -37,9 +37,9 @@ SMALLEST_NOISE = 1e-6
 class ReducedTuning(NamedTuple):
     """What the filter takes for granted of the unknown; chosen on patients of `mixed` and `wide`."""
 
-    net_time: float = 0.05
+    net_time: float = 0.08
     """In which the moment that moves the arm forgets [s]."""
-    least: float = 0.05
+    least: float = 0.03
     """Least size of that moment [Nm]; what it is of a patient is learnt."""
     memory: float = 0.1
     """Time over which that size is learnt [s]."""
@@ -49,7 +49,7 @@ class ReducedTuning(NamedTuple):
     """How far the moment between device and others walks in a second [Nm / sqrt s]."""
     grip_share: float = 2.0
     """That walk for each Nm that moves the arm, beside it [1 / sqrt s]."""
-    inertia_doubt: float = 0.25
+    inertia_doubt: float = 0.2
     """Deviation of a wearer's inertia from the nominal one, as a part of it."""
     weight_doubt: float = 0.2
     """The same of the forearm's moment by its weight."""

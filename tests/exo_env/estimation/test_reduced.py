@@ -108,7 +108,7 @@ def test_full_and_reduced_filter_agree(period):
     world.settle()
     rows, moments = record(world, period, 250, np.random.default_rng(2))
     full = ElbowEstimator(NominalElbow(inertia_doubt=0.0), period)
-    reduced = Filter(period, tuning=ReducedTuning(inertia_doubt=0.0)).run(rows)
+    reduced = Filter(period, tuning=ReducedTuning(net_time=0.05, least=0.05, inertia_doubt=0.0)).run(rows)
     others = []
     for k, row in enumerate(rows):
         readings = dict(zip((ANGLE, RATE, GUIDE_FORCE), row.tolist(), strict=True))
