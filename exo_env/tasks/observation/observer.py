@@ -42,11 +42,14 @@ class Observer:
     ) -> None:
         self.channels = _chosen(observation, groups)
         estimates = {r.name for r in readings if r.estimate is not None}
-        estimating = any(c.source in estimates for _, c in self.channels)
+        estimated = [c for _, c in self.channels if c.source in estimates]
         self.device: Observer | None = None
         """What the device's filter sees, where one of the channels shows an estimate: as noisy as an agent sees it."""
-        if estimating:
+        if estimated:
             self.device = Observer(SENSORS, readings, groups, _noise_of(SENSORS, noise), period)
+        measured = [x for x in self.channels if x[1] not in estimated] + (self.device.channels if self.device else [])
+        self.measured = {f"{group}.{c.name}": c for group, c in measured}
+        """Channels whose imperfections count, by "group.channel": those shown but for estimates, and the filter's."""
         self._readings = {r.name: (r, int(place)) for r, place in zip(readings, first_places(readings), strict=False)}
         self.structure = self._slices()
         self.size = self.structure[-1].stop
