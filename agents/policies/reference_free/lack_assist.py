@@ -7,10 +7,12 @@ others = muscles - hold, without having to tell muscles from load. At rest the p
 
 with the part of others that is meant to move the arm, which is no lack. The device carries its own link, and
 
-    M = link(theta) + (1 - gain) share arm(theta) + gain LowPass(lack) + boost intended - damping rate
+    M = link(theta) + (1 - gain) share arm(theta) + gain LowPass(lack) + boost intended
+        + stiffness (middle - theta) - damping rate
 
 With a gain of 1 the device goes on to hold whatever it holds; with less it lets go, towards a share of an average
-arm's weight, and the patient takes over what the patient can.
+arm's weight, and the patient takes over what the patient can. The soft pull to the middle of the exercise is what has
+helped most among those that are told no plan (`MeanAngle`).
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import numpy as np
 
 from ..tuned import Range
 from .assist_moment import DAMPING, SHARE, SMOOTHING, AssistMoment, Seen
-from .known import at
+from .known import MIDDLE, at
 
 
 class LackAssist(AssistMoment):
@@ -32,6 +34,7 @@ class LackAssist(AssistMoment):
         filtering: time constant of the lack's low-pass filter [s].
         share: of the arm's moment that is given where nothing is believed of the lack [-].
         boost: moment for each Nm that is intended [-].
+        stiffness: towards the middle of the exercise [Nm/rad].
         damping: see `AssistMoment`.
         smoothing: see `AssistMoment`.
     """
@@ -40,7 +43,7 @@ class LackAssist(AssistMoment):
     observation = ("device", "estimated")
     ranges: ClassVar[dict[str, Range]] = {
         "gain": Range(0.0, 1.1), "filtering": Range(0.02, 3.0, True), "share": SHARE, "boost": Range(-1.0, 3.0),
-        "damping": DAMPING, "smoothing": SMOOTHING,
+        "stiffness": Range(0.0, 8.0), "damping": DAMPING, "smoothing": SMOOTHING,
     }  # fmt: skip
 
     def start(self, observations: np.ndarray, seen: Seen) -> None:
@@ -61,4 +64,5 @@ class LackAssist(AssistMoment):
         link = self.link(seen.angle)
         arm = x["share"] * (at(self.known.own, seen.angle) - link)
         carried = arm + x["gain"] * (self._lack - arm)
-        return link + carried + x["boost"] * intended - x["damping"] * seen.rate
+        pull = x["stiffness"] * (MIDDLE - seen.angle) - x["damping"] * seen.rate
+        return link + carried + x["boost"] * intended + pull

@@ -191,7 +191,7 @@ def told(used, observations, **estimates):
 
 
 def test_the_estimated_lack_is_given():
-    used = middle(LackAssist, gain=1.0, filtering=0.02, share=0.0, boost=0.5, damping=0.0)
+    used = middle(LackAssist, gain=1.0, filtering=0.02, share=0.0, boost=0.5, stiffness=2.0, damping=0.0)
     _, observations = begun(used)
     used.act(observations)
     seen = Seen(np.radians([60.0]), np.zeros(1), np.zeros(1))
@@ -203,8 +203,11 @@ def test_the_estimated_lack_is_given():
     # A moment that is to move the arm is no lack less, and is helped by half.
     moved = used.wanted(told(used, observations, others_moment=-2.0, intended_moment=1.0), seen)
     assert moved == pytest.approx(moment + 0.5, rel=1e-5)
+    higher = Seen(np.radians([90.0]), np.zeros(1), np.zeros(1))
+    pulled = used.wanted(at_rest, higher) - used.link(higher.angle) - used._lack
+    assert pulled == pytest.approx(-2.0 * np.radians(30.0), rel=1e-5)
     # Who is believed to lack nothing gets a share of an average arm, by (1 - gain).
-    shy = middle(LackAssist, gain=0.0, filtering=0.02, share=1.0, boost=0.0, damping=0.0)
+    shy = middle(LackAssist, gain=0.0, filtering=0.02, share=1.0, boost=0.0, stiffness=2.0, damping=0.0)
     _, observations = begun(shy)
     shy.act(observations)
     assert shy.wanted(told(shy, observations, others_moment=-3.0), seen) == pytest.approx(
