@@ -17,7 +17,6 @@ from exo_env.estimation.reduced_filter import ESTIMATE
 from exo_env.kernel_checks import check_kernel, uses
 from exo_env.patient.patient import FIELDS
 from exo_env.tasks.observation.channels import Channel, Parts, Reading
-from exo_env.tasks.observation.estimates import SENSORS
 
 INFO_NAMES = (
     "reward_terms", "reward_weights", "time", "solver_failed", "event",
@@ -128,29 +127,6 @@ def check_groups(task: str, groups: Mapping[str, Sequence[Channel]], readings: C
             _check_channel(f"{task}: channel '{group}.{channel.name}'", channel, readings)
 
 
-def check_estimates(task: str, groups: Mapping[str, Sequence[Channel]], readings: Mapping[str, Reading]) -> None:
-    """Check that there is what the device's filter sees, where a channel shows an estimate of it.
-
-    Args:
-        task: name of the task.
-        groups: channels of each group.
-        readings: its readings by name.
-
-    Raises:
-        InputError: a channel of the device is missing, or shows several numbers.
-    """
-    known = {f"{group}.{c.name}": c for group, channels in groups.items() for c in channels}
-    shown = next((name for name, c in known.items() if readings[c.source].estimate is not None), None)
-    if shown is None:
-        return
-    for name in SENSORS:
-        if name not in known or len(readings[known[name].source].labels) != 1:
-            raise InputError(
-                f"{task}: channel '{shown}' shows an estimate, which the device makes of {', '.join(SENSORS)}; "
-                f"expected these channels with one number each, '{name}' is none."
-            )
-
-
 def check_reported(task: str, reported: Iterable[Any], readings: Mapping[str, Reading]) -> None:
     """Check what `info` is to have.
 
@@ -223,7 +199,6 @@ def check_task(task: Any) -> None:
         raise InputError(f"{name}: preview = {plain(ahead)!r}; expected a tuple of finite times from 0 s.")
     check_readings(name, task.readings)
     check_groups(name, task.groups, {r.name: r for r in task.readings})
-    check_estimates(name, task.groups, {r.name: r for r in task.readings})
     check_reported(name, task.reported, {r.name: r for r in task.readings})
     for kernel in (check_kernel(task, "read"), check_kernel(task, "judge")):
         check_beginning(name, kernel, task.readings, task.parts)

@@ -46,6 +46,7 @@ class Observer:
         self.device: Observer | None = None
         """What the device's filter sees, where one of the channels shows an estimate: as noisy as an agent sees it."""
         if estimated:
+            _check_sensors(estimated[0], groups, {r.name: r for r in readings})
             self.device = Observer(SENSORS, readings, groups, _noise_of(SENSORS, noise), period)
         measured = [x for x in self.channels if x[1] not in estimated] + (self.device.channels if self.device else [])
         self.measured = {f"{group}.{c.name}": c for group, c in measured}
@@ -114,6 +115,21 @@ class Observer:
     def memory(self) -> np.ndarray:
         """Room for the past readings of one world, shape (depth, size)."""
         return np.zeros((int(self.imperfections[:, IMPERFECTION.whole].max()) + 2, self.size))
+
+
+def _check_sensors(shown: Channel, groups: Mapping[str, Sequence[Channel]], readings: Mapping[str, Reading]) -> None:
+    """Check that a task has what the device's filter sees.
+
+    Raises:
+        InputError: a channel of the device is missing, or shows several numbers.
+    """
+    known = {f"{group}.{c.name}": c for group, channels in groups.items() for c in channels}
+    for name in SENSORS:
+        if name not in known or len(readings[known[name].source].labels) != 1:
+            raise InputError(
+                f"observation: channel '{shown.name}' shows an estimate, which the device makes of "
+                f"{', '.join(SENSORS)}; expected a task with these channels, of one number each, and '{name}' is none."
+            )
 
 
 def _names(channels: Iterable[tuple[str, Channel]]) -> set[str]:

@@ -137,18 +137,21 @@ class Guessing(LiftTask):
         return [*super().declared_readings(parts), Reading("mood", "-", estimate="mood")]
 
 
-@pytest.mark.parametrize(
-    ("task", "complaint"),
-    [
-        (WithoutForce, r"WithoutForce: channel 'estimated.others_moment' .*'device.guide_force' is none"),
-        (Guessing, r"reading 'mood': estimate 'mood' is unknown; the device's filter estimates effort, "),
-    ],
-)
-def test_what_a_task_declares_of_estimates_is_checked(task, complaint):
+def test_what_a_task_lacks_of_the_filters_sensors_is_named_where_an_estimate_is_asked_for():
     class OwnEnv(ElbowLiftEnv):
-        task_type = task
+        task_type = WithoutForce
 
+    OwnEnv(observation=["device"])
+    complaint = r"'load' shows an estimate, .* device.angle, device.rate, device.guide_force; .*'device.guide_force' is"
     with pytest.raises(InputError, match=complaint):
+        OwnEnv(observation=["device", "estimated.load"])
+
+
+def test_an_estimate_that_there_is_not_is_named():
+    class OwnEnv(ElbowLiftEnv):
+        task_type = Guessing
+
+    with pytest.raises(InputError, match=r"reading 'mood': estimate 'mood' is unknown; the device's filter estimates"):
         OwnEnv()
 
 
