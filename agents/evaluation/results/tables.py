@@ -171,7 +171,7 @@ def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
     if apart:
         rows += [[f"of the {count} with ability from {results['able']:g}", *("" for _ in names)]]
         rows += _rows(policies, "summary_able", OF_THE_ABLE)
-    for other in dict.fromkeys([names[0], best_baseline(policies) or names[0]] if len(names) > 1 else []):
+    for other in dict.fromkeys([names[0], *_opponents(policies)] if len(names) > 1 else []):
         those, what = policies[other]["episodes"], f"mean difference to {other}, patient by patient"
         for head, kept in ((what, list), (f"{what}, of these {count}", able_ones))[: 2 if apart else 1]:
             between = {
@@ -180,6 +180,13 @@ def table_rows(results: Mapping[str, Any]) -> list[list[str]]:
             }
             rows += [[head, *("" for _ in names)], *_rows(between, "d", COMPARED)]
     return rows
+
+
+def _opponents(policies: Mapping[str, Any]) -> list[str]:
+    """Names of those that gaps are measured from; where there are none, of the best classical policy."""
+    named = {gap["opponent"] for p in policies.values() if (gap := p["summary"].get(GAP))}
+    best = best_baseline(policies)
+    return [name for name in policies if name in named] or ([best] if best else [])
 
 
 def best_baseline(policies: Mapping[str, Any]) -> str | None:

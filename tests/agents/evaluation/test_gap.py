@@ -12,7 +12,7 @@ from agents.evaluation.comparison.gap import GAP, gap_closed, pooled_gap
 from agents.evaluation.comparison.opponents import opponent_of, oracle_name, sensors, training_returns, with_opponents
 from agents.evaluation.comparison.pooling import pooled
 from agents.evaluation.results.evaluation_file import read_evaluation
-from agents.evaluation.results.tables import gap_lines, short_table, whole_table
+from agents.evaluation.results.tables import gap_lines, short_table, table_rows, whole_table
 from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.learned import Description, LearnedPolicy, find_policy
 from agents.policies.policy import Policy
@@ -153,6 +153,16 @@ def test_no_gap_is_said_with_its_reason_once():
         first.startswith("Gap closed: from ") and second == f"No gap for {', '.join(found['policies'])}: nobody knows."
     )
     assert "gap closed" in short_table(found) and "| gap closed | - |" in "\n".join(whole_table(found))
+
+
+def test_differences_are_to_who_was_the_best_in_training_not_here():
+    found = evaluate([policy("none"), policy("gravity")], "evaluation", 2, 0, environment=HIDDEN, **SHORT)
+    opponent = opponent_of(policy("none"))
+    for name, p in found["policies"].items():
+        p["summary"]["return"]["value"] = 9.0 if name == "gravity" else 1.0
+    assert opponent != "gravity"
+    said = [row[0] for row in table_rows(found) if row[0].startswith("mean difference to")]
+    assert said == [f"mean difference to {name}, patient by patient" for name in ("none", opponent)]
 
 
 def test_trainings_together_close_a_gap():
