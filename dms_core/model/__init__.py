@@ -29,7 +29,7 @@ from dms_core.model.constraints import (
     Spherical,
     Universal,
 )
-from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
+from dms_core.model.contact import CylinderContact, SphereContact, SphereCylinderContact, SpherePairContact
 from dms_core.model.control import (
     DelayedError,
     ImpedanceController,
@@ -174,6 +174,7 @@ __all__ = [
     "SensorPid",
     "Slider",
     "SphereContact",
+    "SphereCylinderContact",
     "SpherePairContact",
     "Spherical",
     "Spline",
