@@ -296,17 +296,18 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a reaction": (
         {"forces": [pid(sensor="load.Fx"), ROPE],
          "sensors": [JointReaction(name="load", constraint="hinge", body="arm")]},
-        "sensor_pid 'pid': sensor component 'load.Fx' is composed from the forces of other elements",
+        "sensor_pid 'pid': sensor component 'load.Fx' is a force of the constraint 'hinge', which is solved for .*"
+        "a beam with a beam_load, or an elastic_rope with a rope_sensor, into the path of the force",
     ),
     "a moment": (
         {"forces": [pid(sensor="moment"), ROPE],
          "sensors": [JointMoment(name="moment", joint="hinge", elements=("rope",))]},
-        "sensor component 'moment' is composed from the forces of other elements",
+        r"sensor component 'moment' is composed from the forces of other elements \(rope\), which only results",
     ),
     "the tension of a fixed rope": (
         {"forces": [pid(sensor="cell"), ROPE], "constraints": [FIXED],
          "sensors": [RopeSensor(name="cell", rope="fixed", components=("tension",))]},
-        "sensor component 'cell' reads a force of the constraint 'fixed'",
+        "sensor component 'cell' is a force of the constraint 'fixed', which is solved for together with the accel",
     ),
     "no such sensor of a block": (
         {"forces": [StateSpace(name="b", sensors=("x",), outputs=("pull",), D=((1.0,),)), ROPE]},
