@@ -1,39 +1,21 @@
-"""Elements that an analysis without rates of element states cannot have: those that drive inputs, and those that read.
+"""Elements that a kinematic simulation cannot have: those that drive inputs by states of their own.
 
-Readings of sensors and driven inputs are rates of own coordinates (dms_core.assembly.pattern.connections). At rest all
-rates are 0, and in a kinematic simulation those of all element states are: each reading, and each input that such an
-element drives, would count as 0, whatever it is.
+Driven inputs are rates of own coordinates (dms_core.assembly.pattern.connections). In a driven motion the states of
+elements do not follow from positions, and stay at their start: each input that such an element drives would count as 0,
+whatever it is. At rest they are solved for (rest_equations.py).
 """
 
 from __future__ import annotations
 
 from dms_core.assembly.model import Model
 from dms_core.errors import ModelError
-from dms_core.model.element import Declaration
 
 
-def check_reads_nothing(model: Model) -> None:
-    """Refuse a model in which an element reads a sensor, whose reading is not 0 at rest.
-
-    Raises:
-        ModelError: names the element and the sensor component.
-    """
-    for call in model.layout.dynamics:
-        if call.sensor is not None:
-            raise ModelError(
-                f"{_who(call.element)} reads '{call.placement.reads}' by the rate of a state, and at rest all "
-                "rates are 0. Expected a model in which no element reads a sensor: leave it out and give the inputs "
-                "that it drives a signal, let a run in time come to rest, or linearise about the start.",
-                call.element.name,
-            )
-
-
-def check_drives_nothing(model: Model, why: str) -> None:
+def check_drives_nothing(model: Model) -> None:
     """Refuse a model in which an element drives an input by a state of its own; the rate of a body is known.
 
     Args:
         model: a compiled model.
-        why: such a rate is not known, as a clause.
 
     Raises:
         ModelError: names the element and the input.
@@ -41,12 +23,8 @@ def check_drives_nothing(model: Model, why: str) -> None:
     for element in model.system.forces:
         for name, _ in element.driven_inputs():
             raise ModelError(
-                f"{_who(element)} drives input '{name}' by the rate of a state, and {why}. Expected inputs with a "
-                f"course in time: leave the element out and give '{name}' a signal, or run the model in time.",
+                f"{element.kind} '{element.name}' drives input '{name}' by the rate of a state, and states of elements "
+                "do not follow from positions. Expected inputs with a course in time: leave the element out and give "
+                f"'{name}' a signal, or run the model in time.",
                 element.name,
             )
-
-
-def _who(element: Declaration) -> str:
-    """Kind and name."""
-    return f"{element.kind} '{element.name}'"

@@ -108,7 +108,7 @@ class Driven:
     """
 
     def __init__(self, model: Model) -> None:
-        check_drives_nothing(model, "states of elements do not follow from positions")
+        check_drives_nothing(model)
         self.model = model
         self.moving = np.arange(model.layout.of_bodies)
         self.scale = model.tables.values.scale_q
