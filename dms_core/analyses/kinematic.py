@@ -6,8 +6,8 @@ At each time Newton's method closes the constraints from the position predicted 
 errs too much the interval is halved. Where phi_q loses rank the position is singular: the motion goes on along its
 branch and the place is reported, or ends there, where velocities grow without bound (a rocker at the end of its swing).
 
-Turn counters go along with the joints that they count (turn_counts.py). Other states of elements (fibres, activations,
-controllers) do not follow from positions; they stay at their start.
+Turn counters go along with the joints that they count (driven_states.py). Other states of elements (fibres,
+activations, controllers) do not follow from positions; they stay at their start.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dms_core.analyses.driven_inputs import check_drives_nothing
+from dms_core.analyses.driven_states import TurnCounts, check_drives_nothing
 from dms_core.analyses.motion_names import motion_in_words
-from dms_core.analyses.turn_counts import TurnCounts
 from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
 from dms_core.assembly.residual import evaluate_inputs
