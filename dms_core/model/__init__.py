@@ -60,6 +60,7 @@ from dms_core.model.flexible import (
 from dms_core.model.forces import (
     Bushing,
     BushingCurves,
+    BushingLoad,
     FirstOrder,
     Gravity,
     JointMotor,
@@ -111,6 +112,7 @@ __all__ = [
     "Belt",
     "Bushing",
     "BushingCurves",
+    "BushingLoad",
     "Constant",
     "ContactSensor",
     "CoordinateSensor",

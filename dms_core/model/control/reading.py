@@ -37,14 +37,14 @@ def _check_readable(system, sensor: Sensor, component: str) -> None:
             f"{named} is a force of the constraint '{place.constraint}', which is solved for together with the "
             "accelerations: a controller that reads it would be in a loop with its own output, and a share of "
             "redundant constraints is not even unique. Measure it as a load cell does, on a part that gives way: put a "
-            "beam with a beam_load, or an elastic_rope with a rope_sensor, into the path of the force; its stiffness "
-            "and damping are the cell's low-pass."
+            "bushing with a bushing_load, a beam with a beam_load, or an elastic_rope with a rope_sensor, into the "
+            "path of the force; its stiffness and damping are the cell's low-pass."
         )
     if sensor.composition != COMPOSITIONS.none:
         raise ModelError(
             f"{named} is composed from the forces of other elements ({', '.join(place.sources)}), which only results "
-            "evaluate. Expected a sensor of one element: a beam_load, rope_sensor, muscle_sensor or contact_sensor, or "
-            "one of positions, rates and states, from which a state_space can make the force of a spring."
+            "evaluate. Expected a sensor of one element: a bushing_load, beam_load, rope_sensor, muscle_sensor or "
+            "contact_sensor, or one of positions, rates and states, of which a state_space makes a spring's force."
         )
 
 

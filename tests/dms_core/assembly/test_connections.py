@@ -297,7 +297,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"forces": [pid(sensor="load.Fx"), ROPE],
          "sensors": [JointReaction(name="load", constraint="hinge", body="arm")]},
         "sensor_pid 'pid': sensor component 'load.Fx' is a force of the constraint 'hinge', which is solved for .*"
-        "a beam with a beam_load, or an elastic_rope with a rope_sensor, into the path of the force",
+        "a bushing with a bushing_load, a beam with a beam_load, or an elastic_rope with a rope_sensor, into the path",
     ),
     "a moment": (
         {"forces": [pid(sensor="moment"), ROPE],
