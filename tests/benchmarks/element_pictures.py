@@ -112,9 +112,8 @@ def motor(ax: Any) -> None:
     for k, (curve, scale) in enumerate(zip(m.courses(run, t), (1.0, 0.1), strict=True)):
         ax.plot(t, scale * curve, color=COLOURS[k], label=OURS)
         ax.plot(at, scale * exact[:, k], **TRUTH, label=KNOWN)
-        name = ("current [A]", "speed [10 rad/s]")[k]
-        ax.annotate(name, (2.95, scale * curve[295]), xytext=(0, -16), textcoords="offset points", ha="right",
-                    color=COLOURS[k])  # fmt: skip
+        name, height = (("current [A]", 0.6), ("speed [10 rad/s]", 8.4))[k]
+        ax.annotate(name, (2.95, height), ha="right", color=COLOURS[k])
     ax.set(xlabel="time [s]", ylabel="current, speed", title="motor that spins up")
 
 
