@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,11 +14,20 @@ from dms_core.sensitivity.nodes import Number
 from dms_core.sensitivity.record import RecordedWorld
 from dms_core.sensitivity.tangents.radau import RadauStep
 from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.stretch import put_end, put_row, size, steps_back, steps_forward, take_again
 from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_differentials, new_movement
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.addresses import part_addresses
 from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
-from dms_core.simulation.state import CLOCK, COUNTS, new_state
+from dms_core.simulation.state import new_state
+
+
+class Stretch(NamedTuple):
+    """Recorded rows behind each other, see stretch.py."""
+
+    times: np.ndarray
+    rows: np.ndarray
+    kinds: np.ndarray
 
 
 class Replay(World):
@@ -62,88 +71,125 @@ class Replay(World):
                 if self.record.row(j + 1).start:
                     states.append(states[-1])
                     continue
-                self.step(j, states[-1])
+                self._take(self._stretch_from(j, states[-1]), 1, known=False, differentiated=False)
                 states.append(np.array([np.concatenate([self.state.q, self.state.v]), states[-1][0]]))
             self._segment = first, states
         return self._segment[1][k - first]
 
-    def _put(self, k: int, x: np.ndarray) -> None:
-        """Row k into the world, without rates."""
+    def _stretch_from(self, k: int, x: np.ndarray) -> Stretch:
+        """The step that begins at row k in the state x, of which the end is not known."""
+        self._use_tables_of(k)
+        times = self.record.times
+        rows = np.array([x[1], x[0], x[0]])
+        return Stretch(np.array([times[max(k - 1, 0)], *times[k : k + 2]]), rows, self._kinds(k, k + 1))
+
+    def _stretch(self, first: int, last: int) -> Stretch:
+        """Recorded rows first to last."""
+        times, states = self.record.times, [self.state_at(k) for k in range(first, last + 1)]
+        self._use_tables_of(first)
+        rows = np.array([states[0][1], *(x[0] for x in states)])
+        return Stretch(np.array([times[max(first - 1, 0)], *times[first : last + 1]]), rows, self._kinds(first, last))
+
+    def _kinds(self, first: int, last: int) -> np.ndarray:
+        """How the steps from row first to row last are made, of which the first alone may start anew."""
+        kinds = np.full(last - first + 1, self.record.kind(last - 1), np.int64)
+        kinds[1] = self.record.kind(first)
+        return kinds
+
+    def _use_tables_of(self, k: int) -> None:
         if self.record.tables_at(k) is not self._tables:
             self._use(self.record.tables_at(k))
-        s, n, times = self.state, self.model.n_q, self.record.times
-        s.q[:], s.v[:] = x[0, :n], x[0, n:]
-        s.q_before[:], s.v_before[:] = x[1, :n], x[1, n:]
-        s.qd[:] = s.v
-        s.vd[:] = 0.0
-        s.lam_before[:] = s.lam
-        s.mu[:] = 0.0
-        s.clock[CLOCK.t] = times[k]
-        s.clock[CLOCK.h_before] = times[k] - times[k - 1] if k else 0.0
-        s.counts[COUNTS.restart] = 0
 
-    def _guess(self, k: int) -> None:
-        """The recorded end of the step that begins at row k, where it is kept, and the acceleration to it."""
-        d, n, s = self.differentials.values, self.model.n_q, self.state
-        end = self.record.known(k + 1)
-        d.numbers[NUMBERS.known] = end is not None
-        if end is not None:
-            d.end_q[:], d.end_v[:] = end[0, :n], end[0, n:]
-            s.vd[:] = (d.end_v - s.v) / (self.record.times[k + 1] - self.record.times[k])
-
-    def step(self, k: int, x: np.ndarray | None = None) -> float:
-        """Take the step that begins at row k again and differentiate it; gives its size [s].
+    def step(self, k: int, x: np.ndarray | None = None) -> None:
+        """Take the step that begins at row k again and differentiate it.
 
         Args:
             k: a row that a step begins at.
-            x: the state there, as from `state_at`.
+            x: the state there and one row before, as from `state_at`; None: the recorded ones.
 
         Raises:
             SimulationError: the step cannot be solved again.
         """
-        self._put(k, self.state_at(k) if x is None else x)
-        self._guess(k)
-        t, end = self.record.times[k : k + 2]
-        h = end - t
-        # A step must not end behind a jump of the inputs, not even by rounding.
-        while t + h > end:
-            h = math.nextafter(h, 0.0)
-        if not self._differentiate(k, h) and not self._differentiate_from_afar(k, h, x):
+        self._take(self._stretch(k, k + 1) if x is None else self._stretch_from(k, x), 1, x is None)
+
+    def _take(self, stretch: Stretch, j: int, known: bool, differentiated: bool = True) -> None:
+        """Step j of a stretch.
+
+        Args:
+            stretch: rows behind each other.
+            j: the row that the step begins at.
+            known: whether the row behind it is its end.
+            differentiated: whether derivatives are taken, or the state at the end alone is asked for.
+        """
+        d = self.differentials.values
+        d.numbers[NUMBERS.state_only] = not differentiated
+        solved = self._again(stretch, j, known) or self._again_from_afar(stretch, j)
+        d.numbers[NUMBERS.state_only] = 0.0
+        if not solved:
             raise SimulationError(
-                f"system '{self.model.system.name}': the recorded step from t = {t:.6g} s to {end:.6g} s cannot be "
-                "solved again."
+                f"system '{self.model.system.name}': the recorded step from t = {stretch.times[j]:.6g} s to "
+                f"{stretch.times[j + 1]:.6g} s cannot be solved again."
             )
-        return h
 
-    def _differentiate_from_afar(self, k: int, h: float, x: np.ndarray | None) -> bool:
-        """As `_differentiate`, from a fresh start of the method: accelerations and multipliers that belong to it."""
-        self._put(k, self.state_at(k) if x is None else x)
-        self.differentials.values.numbers[NUMBERS.known] = 0.0
-        m, s = self._tables.table, self._world.table
-        set_inputs(m, s, self.record.times[k], False)
-        return bool(run_rates(m, s, PARTS.consistent_rates, 0.0)) and self._differentiate(k, h)
+    def _again(self, stretch: Stretch, j: int, known: bool) -> bool:
+        m, s, d = self._tables.table, self._world.table, self.differentials.table
+        if self.options.method != "radau5":
+            return bool(take_again(m, s, self._numbers, d, stretch.times, stretch.rows, j, stretch.kinds[j], known))
+        put_row(s, stretch.times, stretch.rows, j)
+        if known:
+            put_end(s, d, stretch.times, stretch.rows, j)
+        self._radau = RadauStep(self, self.numbers, float(size(stretch.times, j)))
+        return self._radau.solved
 
-    def _differentiate(self, k: int, h: float) -> bool:
+    def _again_from_afar(self, stretch: Stretch, j: int) -> bool:
+        """From a fresh start of the method: accelerations and multipliers that belong to it."""
+        m, s, d = self._tables.table, self._world.table, self.differentials
+        put_row(s, stretch.times, stretch.rows, j)
+        d.values.numbers[NUMBERS.known] = 0.0
+        set_inputs(m, s, stretch.times[j], False)
+        if not run_rates(m, s, PARTS.consistent_rates, 0.0):
+            return False
+        h = float(size(stretch.times, j))
         if self.options.method == "radau5":
             self._radau = RadauStep(self, self.numbers, h)
             return self._radau.solved
-        kind, o = self.record.kind(k), self._numbers
-        tables = self._tables.table, self._world.table
-        return bool(differentiated_step(*tables, o, self.differentials.table, h, kind))
+        return bool(differentiated_step(m, s, self._numbers, d.table, h, stretch.kinds[j]))
 
-    def forward(self, columns: Packed) -> None:
-        """The columns through the step that was taken last."""
-        if self._radau is not None:
-            self._radau.forward(columns.values)
-            return
-        carry_forward(self._tables.table, self.differentials.table, columns.table)
+    def forward(self, columns: Packed, first: int, last: int) -> None:
+        """The columns from row first to row last, through steps none of which but the first may start anew.
 
-    def back(self, adjoints: Packed) -> None:
-        """The adjoints through the step that was taken last."""
-        if self._radau is not None:
-            self._radau.back(adjoints.values)
-            return
-        carry_back(self._tables.table, self.differentials.table, adjoints.table)
+        Raises:
+            SimulationError: a step cannot be solved again.
+        """
+        stretch = self._stretch(first, last)
+        m, s, d, j = self._tables.table, self._world.table, self.differentials.table, 1
+        while True:
+            if self.options.method != "radau5":
+                j = steps_forward(m, s, self._numbers, d, columns.table, *stretch, j)
+            if j == last - first + 1:
+                return
+            self._take(stretch, j, True)
+            if self._radau is not None:
+                self._radau.forward(columns.values)
+            else:
+                carry_forward(m, d, columns.table)
+            j += 1
+
+    def back(self, adjoints: Packed, first: int, last: int) -> None:
+        """The adjoints from row last to row first, as `forward`."""
+        stretch = self._stretch(first, last)
+        m, s, d, j = self._tables.table, self._world.table, self.differentials.table, last - first + 1
+        while True:
+            if self.options.method != "radau5":
+                j = steps_back(m, s, self._numbers, d, adjoints.table, *stretch, j)
+            if j == 1:
+                return
+            self._take(stretch, j - 1, True)
+            if self._radau is not None:
+                self._radau.back(adjoints.values)
+            else:
+                carry_back(m, d, adjoints.table)
+            j -= 1
 
     def point(self, k: int) -> OperatingPoint:
         """Row k with the accelerations, first-order rates and multipliers that belong to it.
@@ -153,9 +199,11 @@ class Replay(World):
         Raises:
             SimulationError: no accelerations belong to the state.
         """
-        self._put(k, self.state_at(k))
-        behind, t = self.record.row(k).start, self.record.times[k]
+        x, times = self.state_at(k), self.record.times
+        self._use_tables_of(k)
+        behind, t = self.record.row(k).start, times[k]
         m, s = self._tables.table, self._world.table
+        put_row(s, np.array([times[max(k - 1, 0)], t]), x[::-1].copy(), 1)
         set_inputs(m, s, t, not behind)
         if not run_rates(m, s, PARTS.consistent_rates, 0.0):
             raise SimulationError(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -55,6 +56,8 @@ class Shift:
 
 
 By = Start | Shift | Number
+MOST_STEPS = 256
+"""Steps that are taken without a return to Python: short enough for a smooth progress bar."""
 
 
 class Sensitivity:
@@ -81,6 +84,7 @@ class Sensitivity:
         self.record, self.model, self.of, self.by = record, record.model, tuple(of), tuple(by)
         self.numbers = tuple(dict.fromkeys(x for x in self.by if isinstance(x, Number)))
         self.replay = Replay(record, self.numbers)
+        self._times = np.array(record.times)
         spans = [(x.begin, x.end) if isinstance(x, Shift) else (np.inf, np.inf) for x in self.by]
         # A shift begins and ends with recorded steps, to the last bit.
         ends = [[record.times[self._row_at(t)] if np.isfinite(t) else t for t in span] for span in spans]
@@ -124,7 +128,7 @@ class Sensitivity:
 
     def _row_at(self, time: float | None) -> int:
         """The row that ends a step at that time, ahead of a jump."""
-        times = np.array(self.record.times)
+        times = self._times
         if time is None:
             return len(times) - 1
         k = int(np.argmin(np.abs(times - time)))
@@ -142,7 +146,7 @@ class Sensitivity:
         def add(row: int, k: int, weight: float) -> None:
             found.setdefault(row, np.zeros(len(self.of)))[k] += weight
 
-        times = np.array(self.record.times)
+        times = self._times
         for k, output in enumerate(self.of):
             if not output.integral:
                 add(self._row_at(output.time), k, 1.0)
@@ -194,7 +198,7 @@ class Sensitivity:
 
     def _in_force(self, row: int) -> np.ndarray:
         """Whether each shift holds over the step that begins at a row, or for sensors that are read at it."""
-        t = self.record.times[row]
+        t = self._times[row]
         return (self._begin <= t) & (t < self._end)
 
     def _row_shifts(self, row: int) -> np.ndarray:
@@ -227,18 +231,27 @@ class Sensitivity:
         c, count = columns.values, len(self.by)
         c.dq[:], c.dv[:] = self._at_start()
         c.parameter[:] = numbers
+        cuts = self._cuts()
         found = self._forward_row(0, c.dq, c.dv)
-        for k in range(len(self.record.times) - 1):
-            if not self.record.row(k + 1).start:
+        for first, last in pairwise(cuts):
+            if not self.record.row(last).start:
                 c.du[:] = 0.0
-                for j in np.flatnonzero(self._in_force(k)):
+                for j in np.flatnonzero(self._in_force(first)):
                     c.du[j, 3 * inputs[j]] = c.du[count + j, 3 * inputs[j]] = 1.0
-                self.replay.step(k)
-                self.replay.forward(columns)
-            found += self._forward_row(k + 1, c.dq, c.dv)
+                self.replay.forward(columns, first, last)
+            found += self._forward_row(last, c.dq, c.dv)
             if progress is not None:
-                progress(self.record.times[k + 1])
+                progress(self.record.times[last])
         return found
+
+    def _cuts(self) -> list[int]:
+        """Rows from one to the next of which steps are taken in one go: the same shifts hold, and no output is read."""
+        starts = np.flatnonzero(np.diff(self._times) == 0.0)
+        shifts = np.concatenate([self._begin, self._end])
+        moved = np.searchsorted(self._times, shifts[np.isfinite(shifts)])
+        every = np.arange(0, len(self._times), MOST_STEPS if self.record.stride == 1 else self.record.stride)
+        ends = [0, len(self._times) - 1, *self._weights, *self.record.reordered]
+        return np.unique(np.concatenate([starts, starts + 1, moved, every, ends]).astype(int)).tolist()
 
     def _forward_row(self, row: int, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """What the sensors at a row add, shape (n_of, n_by)."""
@@ -266,16 +279,16 @@ class Sensitivity:
         adjoints = new_adjoints(self.model, len(w), len(self.numbers))
         b, found = adjoints.values, np.zeros((len(w), len(self.by)))
         inputs, numbers = self._input_of, self._number_of
-        for k in range(len(self.record.times) - 1, -1, -1):
+        cuts = self._cuts()
+        for first, k in reversed(list(zip([0, *cuts[:-1]], cuts, strict=True))):
             if k in self._weights:
                 found += w @ self._explicit(k)
                 b.aq[:] += w @ self._slopes(k).by_q
                 b.av[:] += w @ self._slopes(k).by_v
             if k and not self.record.row(k).start:
                 b.au[:] = 0.0
-                self.replay.step(k - 1)
-                self.replay.back(adjoints)
-                now = self._in_force(k - 1)
+                self.replay.back(adjoints, first, k)
+                now = self._in_force(first)
                 found[:, now] += b.au[:, 3 * inputs[now]]
             if progress is not None:
                 progress(self.record.times[k])

@@ -1,0 +1,85 @@
+"""Recorded steps behind each other, taken again and differentiated in one compiled call.
+
+Rows of a stretch are recorded states (q, v) with their times; row 0 is the one ahead of the first step, which BDF2
+reaches back to. Step j leads from row j to row j + 1.
+"""
+
+import numpy as np
+
+from dms_core.compiled.arena import floats, ints
+from dms_core.compiled.jit import compiled
+from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
+from dms_core.sensitivity.tangents.tables import DIFFERENTIALS, NUMBERS
+from dms_core.simulation.state import CLOCK, COUNTS, STATE
+
+
+@compiled
+def put_row(s, times, rows, j):
+    """Row j into the world, without rates, on the way from the row before."""
+    q, v, qd, vd = floats(s, STATE.q), floats(s, STATE.v), floats(s, STATE.qd), floats(s, STATE.vd)
+    q_before, v_before = floats(s, STATE.q_before), floats(s, STATE.v_before)
+    n = q.shape[0]
+    for i in range(n):
+        q[i], v[i] = rows[j, i], rows[j, n + i]
+        q_before[i], v_before[i] = rows[j - 1, i], rows[j - 1, n + i]
+        qd[i], vd[i] = v[i], 0.0
+    lam, lam_before, mu = floats(s, STATE.lam), floats(s, STATE.lam_before), floats(s, STATE.mu)
+    for k in range(lam.shape[0]):
+        lam_before[k], mu[k] = lam[k], 0.0
+    clock = floats(s, STATE.clock)
+    clock[CLOCK.t], clock[CLOCK.h_before] = times[j], times[j] - times[j - 1]
+    ints(s, STATE.counts)[COUNTS.restart] = 0
+
+
+@compiled
+def size(times, j):
+    """Of step j; it must not end behind a jump of the inputs, not even by rounding."""
+    h = times[j + 1] - times[j]
+    while times[j] + h > times[j + 1]:
+        h = np.nextafter(h, 0.0)
+    return h
+
+
+@compiled
+def put_end(s, d, times, rows, j):
+    """The end of step j, row j + 1, and the accelerations on the way there."""
+    v, vd, n = floats(s, STATE.v), floats(s, STATE.vd), floats(s, STATE.q).shape[0]
+    end_q, end_v, h = floats(d, DIFFERENTIALS.end_q), floats(d, DIFFERENTIALS.end_v), times[j + 1] - times[j]
+    for i in range(n):
+        end_q[i], end_v[i] = rows[j + 1, i], rows[j + 1, n + i]
+        vd[i] = (end_v[i] - v[i]) / h
+
+
+@compiled
+def take_again(m, s, o, d, times, rows, j, kind, known):
+    """Step j, differentiated; `known`: row j + 1 is its end, else that is not read. False where it cannot be solved."""
+    numbers, h = floats(d, DIFFERENTIALS.numbers), size(times, j)
+    numbers[NUMBERS.known] = 1.0 if known else 0.0
+    put_row(s, times, rows, j)
+    if known:
+        put_end(s, d, times, rows, j)
+        if differentiated_step(m, s, o, d, h, kind):
+            return True
+        # The guess of the method may lead farther than one that lies beyond a kink.
+        numbers[NUMBERS.known] = 0.0
+    return differentiated_step(m, s, o, d, h, kind)
+
+
+@compiled
+def steps_forward(m, s, o, d, c, times, rows, kinds, first):
+    """The columns from row `first` to the last; gives the row that was reached, before a step that fails."""
+    for j in range(first, times.shape[0] - 1):
+        if not take_again(m, s, o, d, times, rows, j, kinds[j], True):
+            return j
+        carry_forward(m, d, c)
+    return times.shape[0] - 1
+
+
+@compiled
+def steps_back(m, s, o, d, b, times, rows, kinds, last):
+    """The adjoints from row `last` to row 1; gives the row that was reached, behind a step that fails."""
+    for j in range(last - 1, 0, -1):
+        if not take_again(m, s, o, d, times, rows, j, kinds[j], True):
+            return j + 1
+        carry_back(m, d, b)
+    return 1
