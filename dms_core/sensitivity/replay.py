@@ -10,12 +10,14 @@ import numpy as np
 from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.compiled.arena import Packed
 from dms_core.errors import SimulationError
-from dms_core.sensitivity.nodes import Number
+from dms_core.sensitivity.nodes import Node, Number, node
 from dms_core.sensitivity.record import RecordedWorld
 from dms_core.sensitivity.tangents.radau import RadauStep
+from dms_core.sensitivity.tangents.reading_tables import SomeReadings, calls_of, reads_welds
+from dms_core.sensitivity.tangents.readings import pull_back
 from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
 from dms_core.sensitivity.tangents.stretch import put_end, put_row, size, steps_back, steps_forward, take_again
-from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_differentials, new_movement
+from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_adjoints, new_differentials, new_movement
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.addresses import part_addresses
 from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
@@ -59,6 +61,7 @@ class Replay(World):
         self.state = self._world.values
         self._movements = [new_movement(tables.values, x) for x in self.directions]
         self.differentials = new_differentials(self.model, tables.values, self.state.w, self._movements, CLOSEST)
+        self._readings: dict[tuple[int, ...], SomeReadings] = {}
 
     def state_at(self, k: int) -> np.ndarray:
         """(q, v) at row k and at the row before, shape (2, 2 n_q), by steps from the kept row ahead of it."""
@@ -210,3 +213,26 @@ class Replay(World):
                 f"system '{self.model.system.name}': no accelerations belong to the state at t = {t:.6g} s."
             )
         return self.operating_point(behind)
+
+    def node(self, k: int, rows: Sequence[int]) -> Node:
+        """These components of sensors at row k, by states, inputs and declared numbers.
+
+        Raises:
+            SimulationError: no accelerations belong to the state.
+        """
+        point, which = self.point(k), tuple(calls_of(self.model, rows))
+        if reads_welds(self.model, which):
+            return node(self.model, point, np.array(rows, int), self.numbers, self.directions)
+        if which not in self._readings:
+            self._readings[which] = SomeReadings(self.model, which, self.state.w, self.directions)
+        readings = self._readings[which]
+        count = len(readings.rows)
+        found, y = new_adjoints(self.model, count, len(self.numbers)), np.zeros(count)
+        m, s, d = self._tables.table, self._world.table, self.differentials.table
+        if not pull_back(m, s, d, readings.packed.table, found.table, y):
+            raise SimulationError(
+                f"system '{self.model.system.name}': a sensor has no finite derivative at t = {self.time:.6g} s."
+            )
+        moments = self.model.derivatives.moments_by_inputs(point, rows)
+        asked, b = np.searchsorted(readings.rows, rows), found.values
+        return Node(y[asked], b.aq[asked], b.av[asked], b.au[asked, ::3] + moments[:, :, 0], b.ap[asked])

@@ -17,7 +17,7 @@ import numpy as np
 from dms_core.analyses.independent import state_names
 from dms_core.errors import InputError, ModelWarning, choices
 from dms_core.model.contact.contact import Contact
-from dms_core.sensitivity.nodes import Node, Number, node, start_columns
+from dms_core.sensitivity.nodes import Node, Number, start_columns
 from dms_core.sensitivity.record import RecordedWorld
 from dms_core.sensitivity.replay import Replay
 from dms_core.sensitivity.tangents.tables import new_adjoints, new_columns
@@ -159,13 +159,12 @@ class Sensitivity:
                     add(j + 1, k, 0.5 * h)
         return found
 
-    def _node(self, row: int) -> tuple[list[int], Node]:
-        """Sensors that count at a row, and their derivatives there."""
-        wanted = {self._sensor(o) for o, w in zip(self.of, self._weights[row], strict=True)
-                  if w != 0.0 and not self._is_state(o)}  # fmt: skip
-        rows = sorted(wanted)
-        point = self.replay.point(row)
-        return rows, node(self.model, point, np.array(rows, int), self.numbers, self.replay.directions)
+    def _read(self, row: int) -> list[int]:
+        """Components of sensors that count at a row."""
+        return sorted({
+            self._sensor(o) for o, w in zip(self.of, self._weights[row], strict=True)
+            if w != 0.0 and not self._is_state(o)
+        })  # fmt: skip
 
     def _slopes(self, row: int) -> Node:
         """What all outputs owe to the state at a row: shapes as in Node, a row each output."""
@@ -177,7 +176,8 @@ class Sensitivity:
         n, w = self.model.n_q, self._weights[row]
         n_u, n_p = len(self.model.layout.input_index), len(self.numbers)
         out = Node(*(np.zeros((len(self.of), k)) for k in (0, n, n, n_u, n_p)))._replace(y=np.zeros(len(self.of)))
-        rows, here = self._node(row)
+        rows = self._read(row)
+        here = self.replay.node(row, rows) if rows else None
         for k, output in enumerate(self.of):
             if w[k] == 0.0:
                 continue
@@ -187,6 +187,7 @@ class Sensitivity:
                 (out.by_q if output.name[0] == "q" else out.by_v)[k, at] += w[k]
                 out.y[k] += w[k] * x[at if output.name[0] == "q" else n + at]
                 continue
+            assert here is not None
             i = rows.index(self._sensor(output))
             for part, add in zip(out, here, strict=True):
                 part[k] += w[k] * add[i]
