@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Collection, Sequence
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -16,8 +16,16 @@ from dms_core.sensitivity.tangents.radau import RadauStep
 from dms_core.sensitivity.tangents.reading_tables import SomeReadings, calls_of, reads_welds
 from dms_core.sensitivity.tangents.readings import pull_back
 from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
-from dms_core.sensitivity.tangents.stretch import put_end, put_row, size, steps_back, steps_forward, take_again
-from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_adjoints, new_differentials, new_movement
+from dms_core.sensitivity.tangents.stretch import (
+    put_end,
+    put_row,
+    read_back,
+    size,
+    steps_back,
+    steps_forward,
+    take_again,
+)
+from dms_core.sensitivity.tangents.tables import CLOSEST, NUMBERS, new_differentials, new_movement
 from dms_core.simulation.dynamics import World
 from dms_core.simulation.iteration.addresses import part_addresses
 from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
@@ -32,17 +40,29 @@ class Stretch(NamedTuple):
     kinds: np.ndarray
 
 
+class Along(NamedTuple):
+    """Sums of sensors that outputs take on their way, as integrals do."""
+
+    rows: Sequence[int]
+    """Components that are read."""
+    sums: np.ndarray
+    """How they are summed: shape (outputs, components of all sensors that have any of these)."""
+    shares: np.ndarray
+    """How much of that counts at each recorded row."""
+
+
 class Replay(World):
     """The steps of a record, in any order.
 
     Args:
         record: a world that has run.
         numbers: declared numbers to differentiate by.
+        inputs: indices of the inputs to differentiate by.
     """
 
-    def __init__(self, record: RecordedWorld, numbers: Sequence[Number] = ()) -> None:
+    def __init__(self, record: RecordedWorld, numbers: Sequence[Number] = (), inputs: Collection[int] = ()) -> None:
         super().__init__(record.model, record.options)
-        self.record = record
+        self.record, self.inputs = record, frozenset(inputs)
         self.numbers = tuple(numbers)
         self.directions = [self.model.parameter_derivatives.direction(*number) for number in self.numbers]
         self._radau: RadauStep | None = None
@@ -178,13 +198,23 @@ class Replay(World):
                 carry_forward(m, d, columns.table)
             j += 1
 
-    def back(self, adjoints: Packed, first: int, last: int) -> None:
-        """The adjoints from row last to row first, as `forward`."""
+    def back(self, adjoints: Packed, first: int, last: int, along: Along) -> None:
+        """The adjoints from row last to row first, as `forward`, with what sensors add on the way.
+
+        Raises:
+            SimulationError: a step cannot be solved again, or no accelerations belong to a row.
+        """
         stretch = self._stretch(first, last)
+        shares = np.concatenate([[0.0], along.shares[first : last + 1]])
+        readings = self._some_readings(tuple(calls_of(self.model, along.rows))).packed
         m, s, d, j = self._tables.table, self._world.table, self.differentials.table, last - first + 1
         while True:
-            if self.options.method != "radau5":
-                j = steps_back(m, s, self._numbers, d, adjoints.table, *stretch, j)
+            if self.options.method == "radau5":
+                j = read_back(m, s, d, adjoints.table, readings.table, along.sums, shares, *stretch[:2], j)
+            else:
+                j = steps_back(m, s, self._numbers, d, adjoints.table, readings.table, along.sums, shares, *stretch, j)
+            if j < 0:
+                self._refuse_rates(stretch.times[-j])
             if j == 1:
                 return
             self._take(stretch, j - 1, True)
@@ -193,6 +223,11 @@ class Replay(World):
             else:
                 carry_back(m, d, adjoints.table)
             j -= 1
+
+    def _refuse_rates(self, t: float) -> NoReturn:
+        raise SimulationError(
+            f"system '{self.model.system.name}': no finite accelerations belong to the state at t = {t:.6g} s."
+        )
 
     def point(self, k: int) -> OperatingPoint:
         """Row k with the accelerations, first-order rates and multipliers that belong to it.
@@ -209,30 +244,45 @@ class Replay(World):
         put_row(s, np.array([times[max(k - 1, 0)], t]), x[::-1].copy(), 1)
         set_inputs(m, s, t, not behind)
         if not run_rates(m, s, PARTS.consistent_rates, 0.0):
-            raise SimulationError(
-                f"system '{self.model.system.name}': no accelerations belong to the state at t = {t:.6g} s."
-            )
+            self._refuse_rates(t)
         return self.operating_point(behind)
+
+    def reads_on_the_way(self, row: int) -> bool:
+        """Whether compiled code alone gives the derivatives of this component of a sensor, as `back` needs."""
+        return not reads_welds(self.model, calls_of(self.model, [row])) and not self._through_moments([row])
+
+    def _through_moments(self, rows: Sequence[int]) -> bool:
+        """Whether a shifted input moves any of these components through an element whose moment it sums."""
+        return bool(self.inputs & self.model.derivatives.inputs.moments_read(rows))
+
+    def _some_readings(self, which: tuple[int, ...]) -> SomeReadings:
+        """Tables of these sensors."""
+        if which not in self._readings:
+            self._readings[which] = SomeReadings(self.model, which, self.state.w, self.directions)
+        return self._readings[which]
+
+    def components_of(self, rows: Sequence[int]) -> int:
+        """How many components all sensors that have any of these have."""
+        return len(self._some_readings(tuple(calls_of(self.model, rows))).rows)
+
+    def components(self, rows: Sequence[int]) -> np.ndarray:
+        """Places of these components among those."""
+        return np.searchsorted(self._some_readings(tuple(calls_of(self.model, rows))).rows, rows)
 
     def node(self, k: int, rows: Sequence[int]) -> Node:
         """These components of sensors at row k, by states, inputs and declared numbers.
 
         Raises:
-            SimulationError: no accelerations belong to the state.
+            SimulationError: no accelerations belong to the state, or a derivative is not finite.
         """
         point, which = self.point(k), tuple(calls_of(self.model, rows))
         if reads_welds(self.model, which):
             return node(self.model, point, np.array(rows, int), self.numbers, self.directions)
-        if which not in self._readings:
-            self._readings[which] = SomeReadings(self.model, which, self.state.w, self.directions)
-        readings = self._readings[which]
-        count = len(readings.rows)
-        found, y = new_adjoints(self.model, count, len(self.numbers)), np.zeros(count)
-        m, s, d = self._tables.table, self._world.table, self.differentials.table
-        if not pull_back(m, s, d, readings.packed.table, found.table, y):
-            raise SimulationError(
-                f"system '{self.model.system.name}': a sensor has no finite derivative at t = {self.time:.6g} s."
-            )
-        moments = self.model.derivatives.moments_by_inputs(point, rows)
-        asked, b = np.searchsorted(readings.rows, rows), found.values
-        return Node(y[asked], b.aq[asked], b.av[asked], b.au[asked, ::3] + moments[:, :, 0], b.ap[asked])
+        readings = self._some_readings(which)
+        if not pull_back(self._tables.table, self._world.table, self.differentials.table, readings.packed.table):
+            self._refuse_rates(self.time)
+        asked, b = self.components(rows), readings.found
+        by_u = b.au[asked, ::3]
+        if self._through_moments(rows):
+            by_u = by_u + self.model.derivatives.moments_by_inputs(point, rows)[:, :, 0]
+        return Node(readings.packed.values.y[asked], b.aq[asked], b.av[asked], by_u, b.ap[asked])

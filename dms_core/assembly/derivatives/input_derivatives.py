@@ -165,6 +165,14 @@ class InputDerivatives:
                 r4[rows, into, 0] += rate_by_value[:, k]
         return r2[: layout.n_q], r3, r4
 
+    def moments_read(self, rows: Collection[int]) -> set[int]:
+        """Inputs that move any of these components of sensors through an element that it sums."""
+        return {
+            int(k) for sensor, sources in self._moments
+            if any(sensor.row <= row < sensor.row + sensor.rows for row in rows)
+            for e in sources for k in self._layout.dynamics[e].iu
+        }  # fmt: skip
+
     def of_moments(self, asked: Collection[int] | None = None) -> np.ndarray:
         """What the inputs of summed elements add to composed sensors, shape (n_y, n_u, 3); other rows are 0.
 

@@ -12,6 +12,7 @@ from dms_core.assembly.model import Model
 from dms_core.assembly.readings.sensing import Composition, Partials, Sensing, new_sensing
 from dms_core.assembly.tables import Calls, Work, flat
 from dms_core.compiled.arena import Packed, fields
+from dms_core.sensitivity.tangents.tables import Adjoints, new_adjoints
 
 
 class Reading(NamedTuple):
@@ -32,6 +33,10 @@ class Readings(NamedTuple):
     """Adjoints of phi_a, shape (k, n_phi)."""
     moved: np.ndarray
     """Addresses of packed `Reading`s, (n_p,)."""
+    y: np.ndarray
+    """Values at the state that was read last, (k,)."""
+    found: Adjoints
+    """Derivatives there."""
 
 
 READING, READINGS = fields(Reading), fields(Readings)
@@ -76,12 +81,14 @@ class SomeReadings:
 
     Attributes:
         rows: components of all sensors that these have.
+        found: derivatives of each of these rows at the state that was read last.
     """
 
     def __init__(self, model: Model, which: Sequence[int], work: Work, directions: Sequence[Direction]) -> None:
         whole: Sensing = model.sensing.values
         calls, own, packed, which = whole.sensors.values, whole.composed.values, Packed(work), list(which)
-        self.rows = np.concatenate([np.arange(calls.row[e], calls.row[e + 1]) for e in which])
+        rows = [np.arange(calls.row[e], calls.row[e + 1]) for e in which]
+        self.rows = np.concatenate([np.zeros(0, np.int64), *rows])
         composed = Packed(Composition(
             own.kind[which], own.constraint[which], *_parts(own.source, own.source_ptr, which)
         ))  # fmt: skip
@@ -98,8 +105,9 @@ class SomeReadings:
 
         self._moved = [Packed(Reading(sensing(1.0, x), sensing(-1.0, x))) for x in directions]
         n, m, k = model.n_q + 7, model.n_phi, len(self.rows)
+        self.found: Adjoints = new_adjoints(model, k, len(directions)).values
         partials = Partials(*(np.zeros((k, size)) for size in (n, n, n, m, len(model.layout.input_index))))
         self.packed = Packed(Readings(
             sensing(0.0, None), partials, np.zeros((k, n)), np.zeros((k, m)),
-            np.array([x.table.ctypes.data for x in self._moved], np.int64),
+            np.array([x.table.ctypes.data for x in self._moved], np.int64), np.zeros(k), self.found,
         ))  # fmt: skip

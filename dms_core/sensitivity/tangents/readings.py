@@ -194,17 +194,26 @@ def _by_numbers(s, w, d, r, b, reads_rates):
 
 
 @compiled
-def pull_back(m, s, d, r, b, y):
-    """Values of the sensors into y, and their derivatives into the Adjoints b, a row each, which are zero before.
+def _clear(r):
+    """All derivatives 0."""
+    b = inner(r, READINGS.found)
+    for block in (ADJOINTS.aq, ADJOINTS.av, ADJOINTS.au, ADJOINTS.ap):
+        matrix(b, block)[:, :] = 0.0
+
+
+@compiled
+def pull_back(m, s, d, r):
+    """Values of the sensors of r and their derivatives, a row each; False where one is not finite.
 
     The state has the accelerations, first-order rates and multipliers that belong to it, and rate_values the factors of
-    their problem: `consistent_rates` was run. False where a derivative is not finite.
+    their problem: `consistent_rates` was run.
     """
-    w, second = inner(s, STATE.w), flags(m, MODEL.second)
-    partials, values = inner(r, READINGS.partials), floats(w, WORK.y)
+    w, second, b = inner(s, STATE.w), flags(m, MODEL.second), inner(r, READINGS.found)
+    partials, values, y = inner(r, READINGS.partials), floats(w, WORK.y), floats(r, READINGS.y)
     aq, av, by_q, by_v = (
         matrix(b, ADJOINTS.aq), matrix(b, ADJOINTS.av), matrix(partials, PARTIALS.q), matrix(partials, PARTIALS.v),
     )  # fmt: skip
+    _clear(r)
     evaluate_sensors(inner(r, READINGS.sensing))
     for k in range(y.shape[0]):
         y[k] = values[k]
@@ -222,3 +231,22 @@ def pull_back(m, s, d, r, b, y):
             av[k, i] = av[k, i] + by_v[k, i] if second[i] else 0.0
             total += abs(aq[k, i]) + abs(av[k, i])
     return total < math.inf
+
+
+@compiled
+def _add(into, found, sums, share):
+    """into[i] += share times the sum of sums[i, k] found[k]."""
+    for i in range(sums.shape[0]):
+        for k in range(sums.shape[1]):
+            weight = share * sums[i, k]
+            if weight != 0.0:
+                for j in range(into.shape[1]):
+                    into[i, j] += weight * found[k, j]
+
+
+@compiled
+def add_readings(r, b, sums, share):
+    """Add `share` times sums of the sensors, shape (outputs, k), to the adjoints of as many outputs."""
+    found = inner(r, READINGS.found)
+    for block in (ADJOINTS.aq, ADJOINTS.av, ADJOINTS.au, ADJOINTS.ap):
+        _add(matrix(b, block), matrix(found, block), sums, share)

@@ -8,8 +8,10 @@ import numpy as np
 
 from dms_core.compiled.arena import floats, ints
 from dms_core.compiled.jit import compiled
+from dms_core.sensitivity.tangents.readings import add_readings, pull_back
 from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
 from dms_core.sensitivity.tangents.tables import DIFFERENTIALS, NUMBERS
+from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 
@@ -76,10 +78,44 @@ def steps_forward(m, s, o, d, c, times, rows, kinds, first):
 
 
 @compiled
-def steps_back(m, s, o, d, b, times, rows, kinds, last):
-    """The adjoints from row `last` to row 1; gives the row that was reached, behind a step that fails."""
-    for j in range(last - 1, 0, -1):
-        if not take_again(m, s, o, d, times, rows, j, kinds[j], True):
-            return j + 1
+def read_row(m, s, d, r, times, rows, j, before):
+    """The sensors of r at row j, with inputs before or behind a jump; False where no accelerations belong to it."""
+    counts = ints(s, STATE.counts)
+    stale = counts[COUNTS.stale]
+    put_row(s, times, rows, j)
+    set_inputs(m, s, times[j], before)
+    if not run_rates(m, s, PARTS.consistent_rates, 0.0):
+        return False
+    # The Newton matrix at hand is that of a stage still.
+    counts[COUNTS.stale] = stale
+    return pull_back(m, s, d, r)
+
+
+@compiled
+def read_back(m, s, d, b, r, sums, shares, times, rows, j):
+    """Add shares[j] times `sums` of the sensors of r at row j to the adjoints; gives j, or -j where that fails.
+
+    Row 1 is read where a jump is there, with inputs behind it; else it ends another stretch.
+    """
+    starts = times[j] == times[j - 1]
+    if shares[j] == 0.0 or (j == 1 and not starts):
+        return j
+    if not read_row(m, s, d, r, times, rows, j, not starts):
+        return -j
+    add_readings(r, b, sums, shares[j])
+    return j
+
+
+@compiled
+def steps_back(m, s, o, d, b, r, sums, shares, times, rows, kinds, last):
+    """The adjoints from row `last` to row 1, with what sensors add, see `read_back`.
+
+    Gives the row that was reached, behind a step that fails, or less than 0 where the reading of a row does.
+    """
+    for j in range(last, 1, -1):
+        if read_back(m, s, d, b, r, sums, shares, times, rows, j) < 0:
+            return -j
+        if not take_again(m, s, o, d, times, rows, j - 1, kinds[j - 1], True):
+            return j
         carry_back(m, d, b)
-    return 1
+    return read_back(m, s, d, b, r, sums, shares, times, rows, 1)
