@@ -46,7 +46,7 @@ class Along(NamedTuple):
     rows: Sequence[int]
     """Components that are read."""
     sums: np.ndarray
-    """How they are summed: shape (outputs, components of all sensors that have any of these)."""
+    """How they are summed: shape (outputs, len(rows))."""
     shares: np.ndarray
     """How much of that counts at each recorded row."""
 
@@ -206,7 +206,7 @@ class Replay(World):
         """
         stretch = self._stretch(first, last)
         shares = np.concatenate([[0.0], along.shares[first : last + 1]])
-        readings = self._some_readings(tuple(calls_of(self.model, along.rows))).packed
+        readings = self._some_readings(along.rows).packed
         m, s, d, j = self._tables.table, self._world.table, self.differentials.table, last - first + 1
         while True:
             if self.options.method == "radau5":
@@ -255,19 +255,12 @@ class Replay(World):
         """Whether a shifted input moves any of these components through an element whose moment it sums."""
         return bool(self.inputs & self.model.derivatives.inputs.moments_read(rows))
 
-    def _some_readings(self, which: tuple[int, ...]) -> SomeReadings:
-        """Tables of these sensors."""
-        if which not in self._readings:
-            self._readings[which] = SomeReadings(self.model, which, self.state.w, self.directions)
-        return self._readings[which]
-
-    def components_of(self, rows: Sequence[int]) -> int:
-        """How many components all sensors that have any of these have."""
-        return len(self._some_readings(tuple(calls_of(self.model, rows))).rows)
-
-    def components(self, rows: Sequence[int]) -> np.ndarray:
-        """Places of these components among those."""
-        return np.searchsorted(self._some_readings(tuple(calls_of(self.model, rows))).rows, rows)
+    def _some_readings(self, rows: Sequence[int]) -> SomeReadings:
+        """Tables of these components of sensors."""
+        key = tuple(rows)
+        if key not in self._readings:
+            self._readings[key] = SomeReadings(self.model, rows, self.state.w, self.directions)
+        return self._readings[key]
 
     def node(self, k: int, rows: Sequence[int]) -> Node:
         """These components of sensors at row k, by states, inputs and declared numbers.
@@ -275,14 +268,14 @@ class Replay(World):
         Raises:
             SimulationError: no accelerations belong to the state, or a derivative is not finite.
         """
-        point, which = self.point(k), tuple(calls_of(self.model, rows))
-        if reads_welds(self.model, which):
+        point = self.point(k)
+        if reads_welds(self.model, calls_of(self.model, rows)):
             return node(self.model, point, np.array(rows, int), self.numbers, self.directions)
-        readings = self._some_readings(which)
+        readings = self._some_readings(rows)
         if not pull_back(self._tables.table, self._world.table, self.differentials.table, readings.packed.table):
             self._refuse_rates(self.time)
-        asked, b = self.components(rows), readings.found
-        by_u = b.au[asked, ::3]
+        b, y = readings.found, readings.packed.values.y
+        by_u = b.au[:, ::3].copy()
         if self._through_moments(rows):
-            by_u = by_u + self.model.derivatives.moments_by_inputs(point, rows)[:, :, 0]
-        return Node(readings.packed.values.y[asked], b.aq[asked], b.av[asked], by_u, b.ap[asked])
+            by_u += self.model.derivatives.moments_by_inputs(point, rows)[:, :, 0]
+        return Node(y.copy(), b.aq.copy(), b.av.copy(), by_u, b.ap.copy())

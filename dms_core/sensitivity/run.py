@@ -91,7 +91,7 @@ class Sensitivity:
         # A shift begins and ends with recorded steps, to the last bit.
         ends = [[record.times[self._row_at(t)] if np.isfinite(t) else t for t in span] for span in spans]
         self._begin, self._end = np.array(ends).reshape(-1, 2).T
-        self._known: dict[tuple[int, bytes], Node] = {}
+        self._known: dict[tuple[int, bytes], tuple[np.ndarray, Node]] = {}
         self._start = start_columns(self.model, self.replay.point(0), self.numbers)
         at = self._start[0]
         self.states = state_names(self.model, at.chosen, at.first)
@@ -173,42 +173,45 @@ class Sensitivity:
         """Weights at the rows that are read apart, as `_weights`, and integrals that are taken on the way back."""
         taken = np.array([o.integral and self.replay.reads_on_the_way(self._sensor(o)) for o in self.of], bool)
         read = self._read(taken.astype(float))
-        sums, places = np.zeros((len(w), self.replay.components_of(read))), self.replay.components(read)
+        sums = np.zeros((len(w), len(read)))
         for k in np.flatnonzero(taken):
-            sums[:, places[read.index(self._sensor(self.of[k]))]] += w[:, k]
+            sums[:, read.index(self._sensor(self.of[k]))] += w[:, k]
         return self._weighted(~taken), Along(read, sums, self._trapezoid if read else np.zeros(len(self._times)))
 
-    def _slopes(self, row: int, w: np.ndarray) -> Node:
-        """What all outputs, of weights w at a row, owe to the state there: shapes as in Node, a row each output."""
+    def _slopes(self, row: int, w: np.ndarray) -> tuple[np.ndarray, Node]:
+        """Outputs whose weights w at a row are not 0, and what they owe to the state there, a row each."""
         key = row, w.tobytes()
         if key not in self._known:
-            self._known[key] = self._find_slopes(row, w)
+            self._known[key] = np.flatnonzero(w), self._find_slopes(row, w)
         return self._known[key]
 
     def _find_slopes(self, row: int, w: np.ndarray) -> Node:
-        n = self.model.n_q
+        n, which = self.model.n_q, np.flatnonzero(w)
         n_u, n_p = len(self.model.layout.input_index), len(self.numbers)
-        out = Node(*(np.zeros((len(self.of), k)) for k in (0, n, n, n_u, n_p)))._replace(y=np.zeros(len(self.of)))
+        out = Node(*(np.zeros((len(which), k)) for k in (0, n, n, n_u, n_p)))._replace(y=np.zeros(len(which)))
         rows = self._read(w)
         here = self.replay.node(row, rows) if rows else None
-        for k, output in enumerate(self.of):
-            if w[k] == 0.0:
-                continue
+        for i, k in enumerate(which):
+            output = self.of[k]
             if self._is_state(output):
                 at = self.model.layout.index[output.name[2:]]
                 x = self.replay.state_at(row)[0]
-                (out.by_q if output.name[0] == "q" else out.by_v)[k, at] += w[k]
-                out.y[k] += w[k] * x[at if output.name[0] == "q" else n + at]
+                (out.by_q if output.name[0] == "q" else out.by_v)[i, at] += w[k]
+                out.y[i] += w[k] * x[at if output.name[0] == "q" else n + at]
                 continue
             assert here is not None
-            i = rows.index(self._sensor(output))
+            j = rows.index(self._sensor(output))
             for part, add in zip(out, here, strict=True):
-                part[k] += w[k] * add[i]
+                part[i] += w[k] * add[j]
         return out
 
     def value(self) -> np.ndarray:
         """The outputs themselves, shape (n_of,)."""
-        return np.sum([self._slopes(row, w).y for row, w in self._weights.items()], axis=0)
+        found = np.zeros(len(self.of))
+        for row, w in self._weights.items():
+            which, slopes = self._slopes(row, w)
+            found[which] += slopes.y
+        return found
 
     def _in_force(self, row: int) -> np.ndarray:
         """Whether each shift holds over the step that begins at a row, or for sensors that are read at it."""
@@ -225,12 +228,12 @@ class Sensitivity:
         half = 0.5 * np.diff(self._times)
         return np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
 
-    @property
+    @cached_property
     def _input_of(self) -> np.ndarray:
         """Index of the input of each shift, 0 for what is none."""
         return np.array([self.model.input_index(x.input) if isinstance(x, Shift) else 0 for x in self.by], int)
 
-    @property
+    @cached_property
     def _number_of(self) -> np.ndarray:
         """Index of each declared number, -1 for what is none."""
         return np.array([self.numbers.index(x) if isinstance(x, Number) else -1 for x in self.by], int)
@@ -278,14 +281,15 @@ class Sensitivity:
 
     def _forward_row(self, row: int, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """What the sensors at a row add, shape (n_of, n_by)."""
-        if row not in self._weights:
-            return np.zeros((len(self.of), len(self.by)))
-        slopes = self._slopes(row, self._weights[row])
-        return self._explicit(row, slopes) + slopes.by_q @ dq.T + slopes.by_v @ dv.T
+        found = np.zeros((len(self.of), len(self.by)))
+        if row in self._weights:
+            which, slopes = self._slopes(row, self._weights[row])
+            found[which] = self._explicit(row, slopes) + slopes.by_q @ dq.T + slopes.by_v @ dv.T
+        return found
 
     def _explicit(self, row: int, slopes: Node) -> np.ndarray:
-        """What the sensors at a row owe to inputs and declared numbers directly, shape (n_of, n_by)."""
-        found = np.zeros((len(self.of), len(self.by)))
+        """What outputs owe to inputs and declared numbers at a row directly, shape (len(slopes.y), n_by)."""
+        found = np.zeros((len(slopes.y), len(self.by)))
         now = self._row_shifts(row)
         found[:, now] += slopes.by_u[:, self._input_of[now]]
         moved = self._number_of >= 0
@@ -307,10 +311,10 @@ class Sensitivity:
         cuts = self._cuts(apart)
         for first, k in reversed(list(zip([0, *cuts[:-1]], cuts, strict=True))):
             if k in apart:
-                slopes = self._slopes(k, apart[k])
-                found += w @ self._explicit(k, slopes)
-                b.aq[:] += w @ slopes.by_q
-                b.av[:] += w @ slopes.by_v
+                which, slopes = self._slopes(k, apart[k])
+                found += w[:, which] @ self._explicit(k, slopes)
+                b.aq[:] += w[:, which] @ slopes.by_q
+                b.av[:] += w[:, which] @ slopes.by_v
             if k and not self.record.row(k).start:
                 b.au[:] = 0.0
                 self.replay.back(adjoints, first, k, along)

@@ -23,10 +23,13 @@ class Reading(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Some sensors of a model, and storage for their derivatives; k counts their components."""
+    """Some sensors of a model, and storage for their derivatives; k counts the components that are asked for."""
 
     sensing: Sensing
     partials: Partials
+    """Of all components of these sensors."""
+    asked: np.ndarray
+    """Places of those that are asked for, (k,)."""
     psi_2: np.ndarray
     """Adjoints of r2, shape (k, n_q + 7)."""
     psi_3: np.ndarray
@@ -75,20 +78,18 @@ class SomeReadings:
 
     Args:
         model: a compiled model.
-        which: sensors by their number.
+        rows: components that are asked for, rising.
         work: work arrays of the world's state.
         directions: declared numbers.
 
     Attributes:
-        rows: components of all sensors that these have.
-        found: derivatives of each of these rows at the state that was read last.
+        found: derivatives of these components at the state that was read last.
     """
 
-    def __init__(self, model: Model, which: Sequence[int], work: Work, directions: Sequence[Direction]) -> None:
+    def __init__(self, model: Model, rows: Sequence[int], work: Work, directions: Sequence[Direction]) -> None:
         whole: Sensing = model.sensing.values
-        calls, own, packed, which = whole.sensors.values, whole.composed.values, Packed(work), list(which)
-        rows = [np.arange(calls.row[e], calls.row[e + 1]) for e in which]
-        self.rows = np.concatenate([np.zeros(0, np.int64), *rows])
+        calls, own, packed, which = whole.sensors.values, whole.composed.values, Packed(work), calls_of(model, rows)
+        every = np.concatenate([np.zeros(0, np.int64), *(np.arange(calls.row[e], calls.row[e + 1]) for e in which)])
         composed = Packed(Composition(
             own.kind[which], own.constraint[which], *_parts(own.source, own.source_ptr, which)
         ))  # fmt: skip
@@ -104,10 +105,10 @@ class SomeReadings:
             return new_sensing(d, c, Packed(_some_calls(sensors, which)), composed, packed).values
 
         self._moved = [Packed(Reading(sensing(1.0, x), sensing(-1.0, x))) for x in directions]
-        n, m, k = model.n_q + 7, model.n_phi, len(self.rows)
+        n, m, k = model.n_q + 7, model.n_phi, len(rows)
         self.found: Adjoints = new_adjoints(model, k, len(directions)).values
-        partials = Partials(*(np.zeros((k, size)) for size in (n, n, n, m, len(model.layout.input_index))))
+        partials = Partials(*(np.zeros((len(every), size)) for size in (n, n, n, m, len(model.layout.input_index))))
         self.packed = Packed(Readings(
-            sensing(0.0, None), partials, np.zeros((k, n)), np.zeros((k, m)),
-            np.array([x.table.ctypes.data for x in self._moved], np.int64), np.zeros(k), self.found,
+            sensing(0.0, None), partials, np.searchsorted(every, rows).astype(np.int64), np.zeros((k, n)),
+            np.zeros((k, m)), np.array([x.table.ctypes.data for x in self._moved], np.int64), np.zeros(k), self.found,
         ))  # fmt: skip

@@ -51,16 +51,17 @@ def _solve(m, s, r):
     by_v, by_a, by_lam = matrix(partials, PARTIALS.v), matrix(partials, PARTIALS.a), matrix(partials, PARTIALS.lam)
     psi_2, psi_3, second = matrix(r, READINGS.psi_2), matrix(r, READINGS.psi_3), flags(m, MODEL.second)
     b, x, n, any_reads = floats(s, STATE.rate_b), floats(s, STATE.rate_x), free.shape[0], False
+    asked = ints(r, READINGS.asked)
     psi_2[:, :] = 0.0
     psi_3[:, :] = 0.0
     for k in range(psi_2.shape[0]):
         reads = False
         for j in range(n):
             c = free[j]
-            b[j] = by_a[k, c] if second[c] else by_v[k, c]
+            b[j] = by_a[asked[k], c] if second[c] else by_v[asked[k], c]
             reads = reads or b[j] != 0.0
         for j in range(active.shape[0]):
-            b[n + j] = by_lam[k, active[j]]
+            b[n + j] = by_lam[asked[k], active[j]]
             reads = reads or b[n + j] != 0.0
         if not reads:
             continue
@@ -147,9 +148,10 @@ def _by_inputs(m, w, d, r, b):
     calls, psi, au = inner(m, MODEL.dynamics), matrix(r, READINGS.psi_2), matrix(b, ADJOINTS.au)
     by_u, slopes = matrix(inner(r, READINGS.partials), PARTIALS.u), inner(d, DIFFERENTIALS.slopes)
     x, kernels, Ju = views(calls, w), ints(d, DIFFERENTIALS.kernels), matrix(slopes, SLOPES.Ju)
-    for k in range(by_u.shape[0]):
+    asked = ints(r, READINGS.asked)
+    for k in range(au.shape[0]):
         for i in range(by_u.shape[1]):
-            au[k, 3 * i] += by_u[k, i]
+            au[k, 3 * i] += by_u[asked[k], i]
     for e in ints(d, DIFFERENTIALS.reading):
         dynamic_by_input(calls, kernels, e, w, slopes)
         start, first = x.iq_ptr[e], x.iu_ptr[e]
@@ -177,7 +179,7 @@ def _add_rows(calls, w, r, ap, j, factor):
 def _by_numbers(s, w, d, r, b, reads_rates):
     """Derivatives by the declared numbers: central differences of what each of them moves."""
     movements, moved, ap = ints(d, DIFFERENTIALS.movements), ints(r, READINGS.moved), matrix(b, ADJOINTS.ap)
-    y = floats(w, WORK.y)
+    y, asked = floats(w, WORK.y), ints(r, READINGS.asked)
     for j in range(movements.shape[0]):
         move, reading = table_at(movements[j], MOVEMENT_FIELDS), table_at(moved[j], READING_FIELDS)
         half = 0.5 / floats(move, MOVEMENT.step)[0]
@@ -185,7 +187,7 @@ def _by_numbers(s, w, d, r, b, reads_rates):
             factor = half if side == 0 else -half
             evaluate_sensors(inner(reading, READING.high if side == 0 else READING.low))
             for k in range(ap.shape[0]):
-                ap[k, j] += factor * y[k]
+                ap[k, j] += factor * y[asked[k]]
             if reads_rates:
                 constraints = inner(move, MOVEMENT.high_constraints if side == 0 else MOVEMENT.low_constraints)
                 dynamics = inner(move, MOVEMENT.high_dynamics if side == 0 else MOVEMENT.low_dynamics)
@@ -206,17 +208,18 @@ def pull_back(m, s, d, r):
     """Values of the sensors of r and their derivatives, a row each; False where one is not finite.
 
     The state has the accelerations, first-order rates and multipliers that belong to it, and rate_values the factors of
-    their problem: `consistent_rates` was run.
+    their problem: as `consistent_rates` leaves it.
     """
     w, second, b = inner(s, STATE.w), flags(m, MODEL.second), inner(r, READINGS.found)
     partials, values, y = inner(r, READINGS.partials), floats(w, WORK.y), floats(r, READINGS.y)
     aq, av, by_q, by_v = (
         matrix(b, ADJOINTS.aq), matrix(b, ADJOINTS.av), matrix(partials, PARTIALS.q), matrix(partials, PARTIALS.v),
     )  # fmt: skip
+    asked = ints(r, READINGS.asked)
     _clear(r)
     evaluate_sensors(inner(r, READINGS.sensing))
     for k in range(y.shape[0]):
-        y[k] = values[k]
+        y[k] = values[asked[k]]
     _partials(m, r, w)
     reads_rates = _solve(m, s, r)
     if reads_rates:
@@ -226,9 +229,9 @@ def pull_back(m, s, d, r):
     total = 0.0
     for k in range(aq.shape[0]):
         for i in range(aq.shape[1]):
-            aq[k, i] += by_q[k, i]
+            aq[k, i] += by_q[asked[k], i]
             # Rates of first-order states follow from the states: they are none.
-            av[k, i] = av[k, i] + by_v[k, i] if second[i] else 0.0
+            av[k, i] = av[k, i] + by_v[asked[k], i] if second[i] else 0.0
             total += abs(aq[k, i]) + abs(av[k, i])
     return total < math.inf
 

@@ -105,8 +105,9 @@ def _count_sweeps(d, g, c0):
         largest = max(largest, size / c0)
     count = 0
     if largest > 0.0:
-        count = MOST_SWEEPS if largest > 0.1 else min(MOST_SWEEPS, int(math.ceil(math.log(LEFT) / math.log(largest))))
-        count = 0 if largest < LEFT else count
+        # A solve leaves that share, and each repeated one as much of what was left.
+        solves = MOST_SWEEPS if largest > 0.1 else int(math.ceil(math.log(LEFT) / math.log(largest)))
+        count = min(MOST_SWEEPS, max(0, solves - 1))
     ints(g, AT.sweeps)[0] = count
 
 

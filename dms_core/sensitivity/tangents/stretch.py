@@ -11,7 +11,8 @@ from dms_core.compiled.jit import compiled
 from dms_core.sensitivity.tangents.readings import add_readings, pull_back
 from dms_core.sensitivity.tangents.steps import carry_back, carry_forward, differentiated_step
 from dms_core.sensitivity.tangents.tables import DIFFERENTIALS, NUMBERS
-from dms_core.simulation.iteration.parts import PARTS, run_rates, set_inputs
+from dms_core.simulation.initial_rates import rates_again
+from dms_core.simulation.iteration.parts import set_inputs
 from dms_core.simulation.state import CLOCK, COUNTS, STATE
 
 
@@ -84,7 +85,7 @@ def read_row(m, s, d, r, times, rows, j, before):
     stale = counts[COUNTS.stale]
     put_row(s, times, rows, j)
     set_inputs(m, s, times[j], before)
-    if not run_rates(m, s, PARTS.consistent_rates, 0.0):
+    if not rates_again(m, s):
         return False
     # The Newton matrix at hand is that of a stage still.
     counts[COUNTS.stale] = stale
