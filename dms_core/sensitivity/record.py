@@ -117,6 +117,11 @@ class RecordedWorld(World):
             return -1
         return KIND.sdirk2 if self.row(k).start or self.options.method == "sdirk2" else KIND.bdf2
 
+    @property
+    def reordered(self) -> list[int]:
+        """Rows from which on steps were solved with other tables."""
+        return [first for first, _ in self._orders]
+
     def tables_at(self, k: int) -> Packed:
         """Tables that the step which begins at row k was solved with."""
         return next(tables for first, tables in reversed(self._orders) if first <= max(k, 0))

@@ -8,17 +8,19 @@ rounding. Forward carries one column for each of `by` and suits few of them; the
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from dms_core.analyses.independent import state_names
 from dms_core.errors import InputError, ModelWarning, choices
 from dms_core.model.contact.contact import Contact
-from dms_core.sensitivity.nodes import Node, Number, node, start_columns
+from dms_core.sensitivity.nodes import Node, Number, start_columns
 from dms_core.sensitivity.record import RecordedWorld
-from dms_core.sensitivity.replay import Replay
+from dms_core.sensitivity.replay import Along, Replay
 from dms_core.sensitivity.tangents.tables import new_adjoints, new_columns
 
 
@@ -55,6 +57,8 @@ class Shift:
 
 
 By = Start | Shift | Number
+MOST_STEPS = 256
+"""Steps that are taken without a return to Python: short enough for a smooth progress bar."""
 
 
 class Sensitivity:
@@ -80,19 +84,18 @@ class Sensitivity:
             raise InputError(f"system '{record.model.system.name}': nothing was computed; advance the world first.")
         self.record, self.model, self.of, self.by = record, record.model, tuple(of), tuple(by)
         self.numbers = tuple(dict.fromkeys(x for x in self.by if isinstance(x, Number)))
-        self.replay = Replay(record, self.numbers)
+        inputs = {self.model.input_index(x.input) for x in self.by if isinstance(x, Shift)}
+        self.replay = Replay(record, self.numbers, inputs)
+        self._times = np.array(record.times)
         spans = [(x.begin, x.end) if isinstance(x, Shift) else (np.inf, np.inf) for x in self.by]
         # A shift begins and ends with recorded steps, to the last bit.
         ends = [[record.times[self._row_at(t)] if np.isfinite(t) else t for t in span] for span in spans]
         self._begin, self._end = np.array(ends).reshape(-1, 2).T
-        self._known: dict[int, Node] = {}
+        self._known: dict[tuple[int, bytes], tuple[np.ndarray, Node]] = {}
         self._start = start_columns(self.model, self.replay.point(0), self.numbers)
         at = self._start[0]
         self.states = state_names(self.model, at.chosen, at.first)
-        for output in self.of:
-            if not self._is_state(output):
-                self._sensor(output)
-        self._weights = self._weighted()
+        self._check_outputs()
         self.by_start: tuple[np.ndarray, np.ndarray] | None = None
         """Behind `adjoint`: by q and v at the start in all coordinates, shape (k, n_q) twice."""
         self._check()
@@ -112,6 +115,16 @@ class Sensitivity:
             )
         return names.index(output.name)
 
+    def _check_outputs(self) -> None:
+        """Names and times of what is differentiated."""
+        for output in self.of:
+            if not self._is_state(output):
+                self._sensor(output)
+            elif output.integral:
+                raise InputError(f"'{output.name}' is a state; expected a sensor under an integral.")
+            if not output.integral:
+                self._row_at(output.time)
+
     def _check(self) -> None:
         """Names of what is differentiated by."""
         for x in self.by:
@@ -124,7 +137,7 @@ class Sensitivity:
 
     def _row_at(self, time: float | None) -> int:
         """The row that ends a step at that time, ahead of a jump."""
-        times = np.array(self.record.times)
+        times = self._times
         if time is None:
             return len(times) - 1
         k = int(np.argmin(np.abs(times - time)))
@@ -135,80 +148,92 @@ class Sensitivity:
             )
         return k
 
-    def _weighted(self) -> dict[int, np.ndarray]:
-        """What each output takes of the value at each row: shape (n_of,) at the rows that count."""
+    def _weighted(self, asked: np.ndarray) -> dict[int, np.ndarray]:
+        """What each output that is asked for takes of the value at each row: shape (n_of,) at the rows that count."""
         found: dict[int, np.ndarray] = {}
-
-        def add(row: int, k: int, weight: float) -> None:
-            found.setdefault(row, np.zeros(len(self.of)))[k] += weight
-
-        times = np.array(self.record.times)
-        for k, output in enumerate(self.of):
-            if not output.integral:
-                add(self._row_at(output.time), k, 1.0)
-                continue
-            if self._is_state(output):
-                raise InputError(f"'{output.name}' is a state; expected a sensor under an integral.")
-            for j, h in enumerate(np.diff(times)):
-                if h > 0.0:
-                    add(j, k, 0.5 * h)
-                    add(j + 1, k, 0.5 * h)
+        for k in np.flatnonzero(asked):
+            integral = self.of[k].integral
+            rows = np.flatnonzero(self._trapezoid) if integral else [self._row_at(self.of[k].time)]
+            for row in rows:
+                found.setdefault(int(row), np.zeros(len(self.of)))[k] += self._trapezoid[row] if integral else 1.0
         return found
 
-    def _node(self, row: int) -> tuple[list[int], Node]:
-        """Sensors that count at a row, and their derivatives there."""
-        wanted = {self._sensor(o) for o, w in zip(self.of, self._weights[row], strict=True)
-                  if w != 0.0 and not self._is_state(o)}  # fmt: skip
-        rows = sorted(wanted)
-        if not rows:
-            return rows, Node(*(np.zeros((0, 0)),) * len(Node._fields))
-        point = self.replay.point(row)
-        return rows, node(self.model, point, np.array(rows, int), self.numbers, self.replay.directions)
+    @cached_property
+    def _weights(self) -> dict[int, np.ndarray]:
+        """Those of all outputs."""
+        return self._weighted(np.ones(len(self.of), bool))
 
-    def _slopes(self, row: int) -> Node:
-        """What all outputs owe to the state at a row: shapes as in Node, a row each output."""
-        if row not in self._known:
-            self._known[row] = self._find_slopes(row)
-        return self._known[row]
+    def _read(self, weights: np.ndarray) -> list[int]:
+        """Components of sensors that count where outputs have these weights."""
+        return sorted({
+            self._sensor(o) for o, w in zip(self.of, weights, strict=True) if w != 0.0 and not self._is_state(o)
+        })  # fmt: skip
 
-    def _find_slopes(self, row: int) -> Node:
-        n, w = self.model.n_q, self._weights[row]
+    def _on_the_way(self, w: np.ndarray) -> tuple[dict[int, np.ndarray], Along]:
+        """Weights at the rows that are read apart, as `_weights`, and integrals that are taken on the way back."""
+        taken = np.array([o.integral and self.replay.reads_on_the_way(self._sensor(o)) for o in self.of], bool)
+        read = self._read(taken.astype(float))
+        sums = np.zeros((len(w), len(read)))
+        for k in np.flatnonzero(taken):
+            sums[:, read.index(self._sensor(self.of[k]))] += w[:, k]
+        return self._weighted(~taken), Along(read, sums, self._trapezoid if read else np.zeros(len(self._times)))
+
+    def _slopes(self, row: int, w: np.ndarray) -> tuple[np.ndarray, Node]:
+        """Outputs whose weights w at a row are not 0, and what they owe to the state there, a row each."""
+        key = row, w.tobytes()
+        if key not in self._known:
+            self._known[key] = np.flatnonzero(w), self._find_slopes(row, w)
+        return self._known[key]
+
+    def _find_slopes(self, row: int, w: np.ndarray) -> Node:
+        n, which = self.model.n_q, np.flatnonzero(w)
         n_u, n_p = len(self.model.layout.input_index), len(self.numbers)
-        out = Node(*(np.zeros((len(self.of), k)) for k in (0, n, n, n_u, n_p)))._replace(y=np.zeros(len(self.of)))
-        rows, here = self._node(row)
-        for k, output in enumerate(self.of):
-            if w[k] == 0.0:
-                continue
+        out = Node(*(np.zeros((len(which), k)) for k in (0, n, n, n_u, n_p)))._replace(y=np.zeros(len(which)))
+        rows = self._read(w)
+        here = self.replay.node(row, rows) if rows else None
+        for i, k in enumerate(which):
+            output = self.of[k]
             if self._is_state(output):
                 at = self.model.layout.index[output.name[2:]]
                 x = self.replay.state_at(row)[0]
-                (out.by_q if output.name[0] == "q" else out.by_v)[k, at] += w[k]
-                out.y[k] += w[k] * x[at if output.name[0] == "q" else n + at]
+                (out.by_q if output.name[0] == "q" else out.by_v)[i, at] += w[k]
+                out.y[i] += w[k] * x[at if output.name[0] == "q" else n + at]
                 continue
-            i = rows.index(self._sensor(output))
+            assert here is not None
+            j = rows.index(self._sensor(output))
             for part, add in zip(out, here, strict=True):
-                part[k] += w[k] * add[i]
+                part[i] += w[k] * add[j]
         return out
 
     def value(self) -> np.ndarray:
         """The outputs themselves, shape (n_of,)."""
-        return np.sum([self._slopes(row).y for row in self._weights], axis=0)
+        found = np.zeros(len(self.of))
+        for row, w in self._weights.items():
+            which, slopes = self._slopes(row, w)
+            found[which] += slopes.y
+        return found
 
     def _in_force(self, row: int) -> np.ndarray:
         """Whether each shift holds over the step that begins at a row, or for sensors that are read at it."""
-        t = self.record.times[row]
+        t = self._times[row]
         return (self._begin <= t) & (t < self._end)
 
     def _row_shifts(self, row: int) -> np.ndarray:
         """Shifts that sensors at a row see: those of the step that ends there, or behind a jump of the next."""
         return self._in_force(row if self.record.row(row).start else row - 1)
 
-    @property
+    @cached_property
+    def _trapezoid(self) -> np.ndarray:
+        """Weight of each row in an integral over the run."""
+        half = 0.5 * np.diff(self._times)
+        return np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
+
+    @cached_property
     def _input_of(self) -> np.ndarray:
         """Index of the input of each shift, 0 for what is none."""
         return np.array([self.model.input_index(x.input) if isinstance(x, Shift) else 0 for x in self.by], int)
 
-    @property
+    @cached_property
     def _number_of(self) -> np.ndarray:
         """Index of each declared number, -1 for what is none."""
         return np.array([self.numbers.index(x) if isinstance(x, Number) else -1 for x in self.by], int)
@@ -229,28 +254,42 @@ class Sensitivity:
         c, count = columns.values, len(self.by)
         c.dq[:], c.dv[:] = self._at_start()
         c.parameter[:] = numbers
+        cuts = self._cuts(self._weights)
         found = self._forward_row(0, c.dq, c.dv)
-        for k in range(len(self.record.times) - 1):
-            if not self.record.row(k + 1).start:
+        for first, last in pairwise(cuts):
+            if not self.record.row(last).start:
                 c.du[:] = 0.0
-                for j in np.flatnonzero(self._in_force(k)):
+                for j in np.flatnonzero(self._in_force(first)):
                     c.du[j, 3 * inputs[j]] = c.du[count + j, 3 * inputs[j]] = 1.0
-                self.replay.step(k)
-                self.replay.forward(columns)
-            found += self._forward_row(k + 1, c.dq, c.dv)
+                self.replay.forward(columns, first, last)
+            found += self._forward_row(last, c.dq, c.dv)
             if progress is not None:
-                progress(self.record.times[k + 1])
+                progress(self.record.times[last])
         return found
+
+    def _cuts(self, read: Collection[int]) -> list[int]:
+        """Rows from one to the next of which steps are taken in one go.
+
+        The same shifts hold there, and no row of `read` lies between.
+        """
+        starts = np.flatnonzero(np.diff(self._times) == 0.0)
+        shifts = np.concatenate([self._begin, self._end])
+        moved = np.searchsorted(self._times, shifts[np.isfinite(shifts)])
+        every = np.arange(0, len(self._times), MOST_STEPS if self.record.stride == 1 else self.record.stride)
+        ends = [0, len(self._times) - 1, *read, *self.record.reordered]
+        return np.unique(np.concatenate([starts, starts + 1, moved, every, ends]).astype(int)).tolist()
 
     def _forward_row(self, row: int, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """What the sensors at a row add, shape (n_of, n_by)."""
-        if row not in self._weights:
-            return np.zeros((len(self.of), len(self.by)))
-        return self._explicit(row) + self._slopes(row).by_q @ dq.T + self._slopes(row).by_v @ dv.T
+        found = np.zeros((len(self.of), len(self.by)))
+        if row in self._weights:
+            which, slopes = self._slopes(row, self._weights[row])
+            found[which] = self._explicit(row, slopes) + slopes.by_q @ dq.T + slopes.by_v @ dv.T
+        return found
 
-    def _explicit(self, row: int) -> np.ndarray:
-        """What the sensors at a row owe to inputs and declared numbers directly, shape (n_of, n_by)."""
-        slopes, found = self._slopes(row), np.zeros((len(self.of), len(self.by)))
+    def _explicit(self, row: int, slopes: Node) -> np.ndarray:
+        """What outputs owe to inputs and declared numbers at a row directly, shape (len(slopes.y), n_by)."""
+        found = np.zeros((len(slopes.y), len(self.by)))
         now = self._row_shifts(row)
         found[:, now] += slopes.by_u[:, self._input_of[now]]
         moved = self._number_of >= 0
@@ -268,16 +307,18 @@ class Sensitivity:
         adjoints = new_adjoints(self.model, len(w), len(self.numbers))
         b, found = adjoints.values, np.zeros((len(w), len(self.by)))
         inputs, numbers = self._input_of, self._number_of
-        for k in range(len(self.record.times) - 1, -1, -1):
-            if k in self._weights:
-                found += w @ self._explicit(k)
-                b.aq[:] += w @ self._slopes(k).by_q
-                b.av[:] += w @ self._slopes(k).by_v
+        apart, along = self._on_the_way(w)
+        cuts = self._cuts(apart)
+        for first, k in reversed(list(zip([0, *cuts[:-1]], cuts, strict=True))):
+            if k in apart:
+                which, slopes = self._slopes(k, apart[k])
+                found += w[:, which] @ self._explicit(k, slopes)
+                b.aq[:] += w[:, which] @ slopes.by_q
+                b.av[:] += w[:, which] @ slopes.by_v
             if k and not self.record.row(k).start:
                 b.au[:] = 0.0
-                self.replay.step(k - 1)
-                self.replay.back(adjoints)
-                now = self._in_force(k - 1)
+                self.replay.back(adjoints, first, k, along)
+                now = self._in_force(first)
                 found[:, now] += b.au[:, 3 * inputs[now]]
             if progress is not None:
                 progress(self.record.times[k])

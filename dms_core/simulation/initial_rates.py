@@ -14,7 +14,7 @@ import math
 from dms_core.assembly.tables import MODEL, WORK
 from dms_core.compiled.arena import flags, floats, inner, ints, naturals, number
 from dms_core.compiled.jit import compiled
-from dms_core.simulation.iteration.parts import PARTS, run_part
+from dms_core.simulation.iteration.parts import PARTS, run_part, run_rates
 from dms_core.simulation.state import CLOCK, COUNTS, STATE, begin_matrix
 
 MAX_ITERATIONS = 60
@@ -22,6 +22,9 @@ SMALL_CHANGE = 0.02
 """Correction of a first-order rate, over its nominal size, up to which its equation counts as linear."""
 TOLERANCE = 1e-11
 """Relative size of the last correction: the problem is solved to rounding, since all that follows builds on it."""
+MOST_AGAIN = 3
+SOLVED = 1e-9
+"""Correction of a first-order rate, over its nominal size, that says that the matrix belongs to it to rounding."""
 ROUNDING = 1e-3
 """Correction of an acceleration, over 1 + its size, below which one that no longer shrinks is rounding.
 
@@ -158,6 +161,23 @@ def consistent_rates(m, s, _c0):
     _take_rates(m, s)
     ints(s, STATE.counts)[COUNTS.stale] = 1
     return True
+
+
+@compiled
+def rates_again(m, s):
+    """As consistent_rates, where first-order rates nearly solve their equations already, as at a recorded state.
+
+    Accelerations and multipliers enter linearly, so that one correction does where first-order rates stay, and two
+    where they are those of a stage. The matrix belongs to the state in either case.
+    """
+    _put_state(m, s)
+    for _ in range(MOST_AGAIN):
+        if not _correct(m, s, PARTS.rate_matrix) or not _change(m, s) < math.inf:
+            break
+        if _first_order_change(m, s) < SOLVED:
+            _take_rates(m, s)
+            return True
+    return run_rates(m, s, PARTS.consistent_rates, 0.0)
 
 
 @compiled

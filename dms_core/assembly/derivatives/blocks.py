@@ -16,6 +16,7 @@ r4 that per second.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -275,6 +276,11 @@ class Derivatives:
             w.y.copy(), partials.q[:, :n], partials.v[:, :n], partials.a[:, :n], partials.lam,
             np.zeros((n_y, self._layout.n_phi)), u, self.inputs.differenced,
         )  # fmt: skip
+
+    def moments_by_inputs(self, point: OperatingPoint, rows: Sequence[int]) -> np.ndarray:
+        """What inputs do to these sensors through the elements that they sum, shape (len(rows), n_u, 3)."""
+        self.put(point)
+        return self.inputs.of_moments(rows)[rows]
 
     def partials(self) -> Partials:
         """Derivatives of the sensors at the state in the work arrays, the ground's columns included.

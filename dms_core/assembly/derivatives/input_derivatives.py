@@ -13,6 +13,8 @@ phi = g(q) + s(u), what it writes into phi_t is linear in the rates and quadrati
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from dms_core.assembly.layout import Call, Layout
@@ -163,12 +165,26 @@ class InputDerivatives:
                 r4[rows, into, 0] += rate_by_value[:, k]
         return r2[: layout.n_q], r3, r4
 
-    def of_moments(self) -> np.ndarray:
-        """What the inputs of summed elements add to composed sensors, shape (n_y, n_u, 3); other rows are 0."""
+    def moments_read(self, rows: Collection[int]) -> set[int]:
+        """Inputs that move any of these components of sensors through an element that it sums."""
+        return {
+            int(k) for sensor, sources in self._moments
+            if any(sensor.row <= row < sensor.row + sensor.rows for row in rows)
+            for e in sources for k in self._layout.dynamics[e].iu
+        }  # fmt: skip
+
+    def of_moments(self, asked: Collection[int] | None = None) -> np.ndarray:
+        """What the inputs of summed elements add to composed sensors, shape (n_y, n_u, 3); other rows are 0.
+
+        Args:
+            asked: components of sensors that are wanted, all if None.
+        """
         layout = self._layout
         y = np.zeros((len(layout.outputs), len(layout.input_index), 3))
         q = self._sensing.work.values.q
         for sensor, sources in self._moments:
+            if asked is not None and not any(sensor.row <= k < sensor.row + sensor.rows for k in asked):
+                continue
             for e in sources:
                 call = layout.dynamics[e]
                 if sensor.element.composition == COMPOSITIONS.force_load:  # type: ignore[union-attr]

@@ -13,6 +13,7 @@ for by repeated solves, x <- A^-1 (b + (phi_q^T mu)_q x), each of which gains th
 """
 
 import math
+from typing import NamedTuple
 
 from dms_core.assembly.derivatives.blocks import scatter_projection
 from dms_core.assembly.derivatives.input_derivatives import constraint_by_input, dynamic_by_input
@@ -27,7 +28,7 @@ from dms_core.assembly.local import (
 from dms_core.assembly.residual import evaluate_residual
 from dms_core.assembly.scatter import BLOCKS, begin_newton, scatter_constraint, scatter_dynamic, scatter_part
 from dms_core.assembly.tables import CALLS, MODEL, WORK
-from dms_core.compiled.arena import floats, indices, inner, ints, matrix, naturals, table_at
+from dms_core.compiled.arena import fields, floats, indices, inner, ints, matrix, naturals, table_at
 from dms_core.compiled.entries import SLOPES
 from dms_core.compiled.jit import compiled
 from dms_core.sensitivity.tangents.tables import DIFFERENTIALS, MOVEMENT, NUMBERS, Movement
@@ -36,16 +37,35 @@ from dms_core.simulation.iteration.implicit_stage import LOCAL_SHARE
 from dms_core.simulation.iteration.linear_solve import back_substitute, factorise
 from dms_core.simulation.iteration.newton import apply, correction, correction_norm, right_hand_side
 from dms_core.simulation.iteration.parts import PARTS, SINGULAR_PIVOT, run_part
-from dms_core.simulation.state import STATE, begin_matrix
+from dms_core.simulation.state import CLOCK, COUNTS, STATE, begin_matrix
 
 PASSES = 4
-POLISHINGS = 6
-STALLED = 0.1
-"""Share of the correction before above which one is rounding."""
+POLISHINGS = 8
+MORE = 4
+"""Corrections that cost as much as other factors, which are taken where more than that would be needed."""
+STALLED = 0.5
+"""Contraction from which on, behind better ones, a correction is rounding."""
+C0_CHANGE = 0.5
+"""Relative change of c0 up to which old factors are tried; the scaled matrix depends on c0 only weakly."""
+LEAST_FORCE = 1e-3
+"""Multiplier [N] beside which one counts as 0."""
 LEFT = 1e-14
 """Share of a solution that repeated solves leave of what the Newton matrix lacks."""
 MOST_SWEEPS = 12
 MOVEMENT_FIELDS = len(Movement._fields)
+
+
+class Settled(NamedTuple):
+    """How the iteration for a stage that is differentiated ended."""
+
+    singular: int
+    """Its matrix is singular, or not finite."""
+    no: int
+    """The matrix was taken at a point that is farther from the stage than was asked for."""
+    yes: int
+
+
+SETTLED = fields(Settled)
 
 
 @compiled
@@ -85,8 +105,9 @@ def _count_sweeps(d, g, c0):
         largest = max(largest, size / c0)
     count = 0
     if largest > 0.0:
-        count = MOST_SWEEPS if largest > 0.1 else min(MOST_SWEEPS, int(math.ceil(math.log(LEFT) / math.log(largest))))
-        count = 0 if largest < LEFT else count
+        # A solve leaves that share, and each repeated one as much of what was left.
+        solves = MOST_SWEEPS if largest > 0.1 else int(math.ceil(math.log(LEFT) / math.log(largest)))
+        count = min(MOST_SWEEPS, max(0, solves - 1))
     ints(g, AT.sweeps)[0] = count
 
 
@@ -149,18 +170,44 @@ def _by_numbers(s, d, g):
 
 
 @compiled
-def _polish(m, s, c0, close):
-    """Corrections with the matrix at hand until they are smaller than `close`, or no longer shrink."""
-    before = math.inf
-    for _ in range(POLISHINGS):
+def _has_factors(s, c0):
+    """Whether the factors at hand are of a matrix that is like the one for c0."""
+    usable = abs(c0 / floats(s, STATE.clock)[CLOCK.c0_factored] - 1.0) < C0_CHANGE
+    return usable and ints(s, STATE.counts)[COUNTS.stale] == 0
+
+
+@compiled
+def _distance(m, s, o, c0):
+    """As `correction_norm`, and of the multipliers, over their largest: derivatives of phi_q^T lam go with these."""
+    x, lam, active = floats(s, STATE.x), floats(inner(s, STATE.w), WORK.lam), naturals(m, MODEL.active)
+    n, size, change = naturals(m, MODEL.free).shape[0], LEAST_FORCE, 0.0
+    for k in range(active.shape[0]):
+        size = max(size, abs(lam[active[k]]))
+        change = max(change, c0 * c0 * abs(x[2 * n + k]))
+    return max(correction_norm(m, s, c0), change / (LOCAL_SHARE * o.rtol * size))
+
+
+@compiled
+def _polish(m, s, o, c0, close):
+    """Corrections with the factors at hand; True where what is left is smaller than `close`, or rounding."""
+    before, contracts = math.inf, False
+    for k in range(POLISHINGS):
         run_part(m, s, PARTS.residual)
         norm = correction(m, s, c0)
-        if not norm < before:
-            return
+        distance = _distance(m, s, o, c0)
+        rounding = contracts or norm < close
+        if not distance < before:
+            return rounding and k > 0
         apply(m, s, c0, floats(s, STATE.x), 1.0)
-        if norm < close or norm > STALLED * before:
-            return
-        before = norm
+        if k > 0:
+            ratio = distance / before
+            if distance * ratio < close or (rounding and ratio > STALLED):
+                return True
+            if distance * ratio**MORE > close:
+                return False
+            contracts = True
+        before = distance
+    return False
 
 
 @compiled
@@ -174,29 +221,34 @@ def _keep_factors(s, values, c0):
 
 @compiled
 def differentiate_stage(m, s, o, d, g, c0):
-    """Bring the stage in w to its converged point and differentiate it there; False where its matrix is singular.
+    """Bring the stage in w to its converged point and differentiate it there; gives a place in Settled.
 
-    The iterate is the one that the method accepted, within its Newton tolerance.
+    The Newton matrix is evaluated and factorised once, at the converged point, where the factors at hand lead there: a
+    correction with them costs a quarter of that.
     """
     values, work = floats(g, AT.factors), floats(d, DIFFERENTIALS.work)
-    b, x = floats(s, STATE.b), floats(s, STATE.x)
-    close, before = floats(d, DIFFERENTIALS.numbers)[NUMBERS.close] / (LOCAL_SHARE * o.rtol), math.inf
-    _polish(m, s, c0, close)
+    b, x, numbers, settled = floats(s, STATE.b), floats(s, STATE.x), floats(d, DIFFERENTIALS.numbers), SETTLED.no
+    close = numbers[NUMBERS.close] / (LOCAL_SHARE * o.rtol)
     for _ in range(PASSES):
+        if _has_factors(s, c0) and _polish(m, s, o, c0, close):
+            settled = SETTLED.yes
+            if numbers[NUMBERS.state_only] == 1.0:
+                return settled
         evaluate_stage(m, s, d, g, c0)
         if not factorise(m, MODEL.newton_lu, values, work) > SINGULAR_PIVOT:
-            return False
+            return SETTLED.singular
         right_hand_side(m, s, c0)
         back_substitute(m, MODEL.newton_lu, values, b, x, work)
-        norm = correction_norm(m, s, c0)
-        if not norm < math.inf:
-            return False
+        distance = _distance(m, s, o, c0)
+        if not distance < math.inf:
+            return SETTLED.singular
         apply(m, s, c0, x, 1.0)
-        if norm < close or norm > STALLED * before:
+        _keep_factors(s, values, c0)
+        if distance < close:
+            settled = SETTLED.yes
+        if settled == SETTLED.yes:
             break
-        before = norm
-    _keep_factors(s, values, c0)
     _count_sweeps(d, g, c0)
     _by_inputs(m, s, d, g)
     _by_numbers(s, d, g)
-    return True
+    return settled

@@ -14,12 +14,12 @@ the constraints already.
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import floats, inner, matrix, naturals
 from dms_core.compiled.jit import compiled
-from dms_core.sensitivity.tangents.stage import differentiate_stage
+from dms_core.sensitivity.tangents.stage import SETTLED, differentiate_stage
 from dms_core.sensitivity.tangents.stage_solve import column_forward, output_back
 from dms_core.sensitivity.tangents.tables import ADJOINTS, COLUMNS, DIFFERENTIALS, KIND, NUMBERS
-from dms_core.simulation.iteration.implicit_stage import set_weights
-from dms_core.simulation.iteration.newton import NEWTON
-from dms_core.simulation.iteration.parts import run_stage
+from dms_core.simulation.iteration.implicit_stage import put_guess, set_weights
+from dms_core.simulation.iteration.newton import NEWTON, set_rates
+from dms_core.simulation.iteration.parts import run_stage, set_inputs
 from dms_core.simulation.methods.bdf2 import prepare_bdf2
 from dms_core.simulation.methods.sdirk2 import GAMMA, prepare_first_stage, prepare_second_stage
 from dms_core.simulation.state import CLOCK, STATE
@@ -27,34 +27,68 @@ from dms_core.simulation.step_control import accept
 
 
 @compiled
-def _guess_end(s, d):
-    """The recorded end of the step, where it is known, as guess of its last stage."""
-    if floats(d, DIFFERENTIALS.numbers)[NUMBERS.known] == 1.0:
-        q, v, end_q, end_v = (
-            floats(s, STATE.q_guess), floats(s, STATE.v_guess), floats(d, DIFFERENTIALS.end_q),
-            floats(d, DIFFERENTIALS.end_v),
-        )  # fmt: skip
-        for i in range(q.shape[0]):
-            q[i], v[i] = end_q[i], end_v[i]
+def _near(m, s, o, d, g, t, c0):
+    """Solve and differentiate a stage from a guess that is close to it; False where that leads nowhere."""
+    set_inputs(m, s, t, True)
+    put_guess(m, s, c0, 0.0)
+    set_rates(s, c0)
+    return differentiate_stage(m, s, o, d, g, c0) == SETTLED.yes
 
 
 @compiled
-def _sdirk2(m, s, o, d, h):
+def _far(m, s, o, d, g, t, c0, lam_slope, last):
+    """Solve and differentiate a stage from the guess of its method; False where that fails."""
+    code, _ = run_stage(m, s, o, t, c0, lam_slope, last)
+    return code == NEWTON.converged and differentiate_stage(m, s, o, d, g, c0) != SETTLED.singular
+
+
+@compiled
+def _guess_end(s, d):
+    """The recorded end of the step as guess of its last stage."""
+    q, v, end_q, end_v = (
+        floats(s, STATE.q_guess), floats(s, STATE.v_guess), floats(d, DIFFERENTIALS.end_q),
+        floats(d, DIFFERENTIALS.end_v),
+    )  # fmt: skip
+    for i in range(q.shape[0]):
+        q[i], v[i] = end_q[i], end_v[i]
+
+
+@compiled
+def _guess_first(s, d, h):
+    """The first stage of SDIRK2 that leads to the recorded end, as its guess.
+
+    qdot of the second stage is v of the end, but for the projection; that of the first one, which is its v, is then
+    what else the step needs.
+    """
+    q, end_q, end_v = floats(s, STATE.q), floats(d, DIFFERENTIALS.end_q), floats(d, DIFFERENTIALS.end_v)
+    q_guess, v_guess = floats(s, STATE.q_guess), floats(s, STATE.v_guess)
+    for i in range(q.shape[0]):
+        v_guess[i] = (end_q[i] - q[i] - GAMMA * h * end_v[i]) / ((1.0 - GAMMA) * h)
+        q_guess[i] = q[i] + GAMMA * h * v_guess[i]
+
+
+@compiled
+def _sdirk2(m, s, o, d, h, known):
     """Solve and differentiate the two stages of a step of size h; False where either fails."""
     t, c0, numbers = floats(s, STATE.clock)[CLOCK.t], 1.0 / (GAMMA * h), floats(d, DIFFERENTIALS.numbers)
+    first, second = inner(d, DIFFERENTIALS.first), inner(d, DIFFERENTIALS.second)
     numbers[NUMBERS.kind], numbers[NUMBERS.h], numbers[NUMBERS.c0] = KIND.sdirk2, h, c0
     prepare_first_stage(s, h, c0)
-    code, _ = run_stage(m, s, o, t + GAMMA * h, c0, 0.0, False)
-    if code != NEWTON.converged or not differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.first), c0):
+    if known:
+        _guess_first(s, d, h)
+        if not _near(m, s, o, d, first, t + GAMMA * h, c0):
+            return False
+        prepare_second_stage(s, h, c0)
+        _guess_end(s, d)
+        return _near(m, s, o, d, second, t + h, c0)
+    if not _far(m, s, o, d, first, t + GAMMA * h, c0, 0.0, False):
         return False
     prepare_second_stage(s, h, c0)
-    _guess_end(s, d)
-    code, _ = run_stage(m, s, o, t + h, c0, 0.0, True)
-    return code == NEWTON.converged and differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.second), c0)
+    return _far(m, s, o, d, second, t + h, c0, 0.0, True)
 
 
 @compiled
-def _bdf2(m, s, o, d, h):
+def _bdf2(m, s, o, d, h, known):
     """Solve and differentiate a step of size h; False where it fails."""
     clock, numbers = floats(s, STATE.clock), floats(d, DIFFERENTIALS.numbers)
     h1 = clock[CLOCK.h_before]
@@ -63,9 +97,11 @@ def _bdf2(m, s, o, d, h):
     numbers[NUMBERS.kind], numbers[NUMBERS.h], numbers[NUMBERS.c0] = KIND.bdf2, h, c0
     numbers[NUMBERS.by_q], numbers[NUMBERS.by_before] = -(1.0 + ratio) / h, ratio * ratio / (1.0 + ratio) / h
     prepare_bdf2(s, h, h1)
-    _guess_end(s, d)
-    code, _ = run_stage(m, s, o, clock[CLOCK.t] + h, c0, ratio, True)
-    return code == NEWTON.converged and differentiate_stage(m, s, o, d, inner(d, DIFFERENTIALS.second), c0)
+    stage, end = inner(d, DIFFERENTIALS.second), clock[CLOCK.t] + h
+    if known:
+        _guess_end(s, d)
+        return _near(m, s, o, d, stage, end, c0)
+    return _far(m, s, o, d, stage, end, c0, ratio, True)
 
 
 @compiled
@@ -75,7 +111,8 @@ def differentiated_step(m, s, o, d, h, kind):
     Size and kind are given: nothing is rejected. What `carry_forward` and `carry_back` need stays in d until the next.
     """
     set_weights(m, s, o)
-    solved = _sdirk2(m, s, o, d, h) if kind == KIND.sdirk2 else _bdf2(m, s, o, d, h)
+    known = floats(d, DIFFERENTIALS.numbers)[NUMBERS.known] == 1.0
+    solved = _sdirk2(m, s, o, d, h, known) if kind == KIND.sdirk2 else _bdf2(m, s, o, d, h, known)
     if solved:
         accept(s, h, floats(d, DIFFERENTIALS.numbers)[NUMBERS.c0], kind == KIND.sdirk2)
     return solved

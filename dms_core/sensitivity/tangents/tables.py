@@ -54,6 +54,8 @@ class Numbers(NamedTuple):
     square of that; derivatives err by about as much."""
     known: int
     """1 where `end_q` and `end_v` hold the end of the step, as it was recorded."""
+    state_only: int
+    """1 where the end of the step is asked for, and no derivative."""
 
 
 class Kind(NamedTuple):
@@ -106,7 +108,7 @@ class Differentials(NamedTuple):
     more: np.ndarray
     """(n_q,)."""
     end_q: np.ndarray
-    """Where the step is known to end, if numbers[NUMBERS.known] is 1: the guess of its last stage."""
+    """Where the step is known to end, if numbers[NUMBERS.known] is 1: its stages follow."""
     end_v: np.ndarray
 
 
