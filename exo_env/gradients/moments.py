@@ -45,7 +45,9 @@ class Moments:
 
     def go_to(self, there: Moment) -> None:
         """Put the world back to a moment of this episode, be it the present one."""
-        self.world.dynamics.rewind(there.mark)
-        self.world.follow_dynamics()
+        dynamics, followed = self.world.dynamics, self.world.tables.dynamics
+        dynamics.rewind(there.mark)
+        if dynamics.tables is not followed.model or dynamics.packed is not followed.state:
+            self.world.follow_dynamics()
         for into, content in zip(self._arrays, there.arrays, strict=True):
             into[...] = np.frombuffer(content, into.dtype).reshape(into.shape)

@@ -38,9 +38,11 @@ def _function() -> Any:
 
     class OnePeriod(torch.autograd.Function):
         @staticmethod
-        def forward(ctx: Any, state: Any, action: Any, numbers: Any, of: Any, moment: Any, behind: Any) -> Any:
+        def forward(
+            ctx: Any, state: Any, action: Any, numbers: Any, of: Any, moment: Any, slopes: Any, behind: Any
+        ) -> Any:
             x, a, p = (y.detach().cpu().double().numpy() for y in (state, action, numbers))
-            used, slopes = checked_action(a, of.env.actions), any(ctx.needs_input_grad)
+            used = checked_action(a, of.env.actions)
             ran = of.periods.run(moment, x, used, p, slopes)
             behind.append(ran.moment)
             ctx.maps, ctx.vector, ctx.inside = ran.maps, of.periods.vector, a == used
@@ -54,7 +56,7 @@ def _function() -> Any:
             carried_back(ctx.maps, x)
             found = [x[: ctx.vector.state], x[at["action"]] * ctx.inside, x[at["numbers"]]]
             tensors = [torch.as_tensor(y).to(kind) for y, kind in zip(found, ctx.types, strict=True)]
-            return *tensors, None, None, None
+            return *tensors, None, None, None, None
 
     return OnePeriod
 
@@ -123,9 +125,13 @@ class ControlPeriod:
             InputError: a shape is wrong, a number is not finite, or the state belongs to another episode or its end.
             SimulationError: the solver gives up.
         """
+        import torch
+
         behind: list[Moment] = []
         given = self.numbers() if numbers is None else numbers
-        x, read = _function().apply(state.numbers, action, given, self, state.moment, behind)
+        # Where torch takes no gradients, as for a test of a policy, none are found.
+        slopes = torch.is_grad_enabled() and any(y.requires_grad for y in (state.numbers, action, given))
+        x, read = _function().apply(state.numbers, action, given, self, state.moment, slopes, behind)
         return State(x, behind[0]), read
 
 

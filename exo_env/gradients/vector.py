@@ -51,6 +51,9 @@ class Vector:
         ends = np.cumsum([0, *sizes.values()])
         self.at = {name: np.arange(a, b) for name, a, b in zip(sizes, ends[:-1], ends[1:], strict=True)}
         """Places of each part."""
+        self._rows = np.full((int(ends[-1]), 2), -1)
+        for k, name in enumerate(self.arrays):
+            self._rows[self.at[name]] = np.stack([np.full(sizes[name], k), np.arange(sizes[name])], axis=1)
         self.size = int(ends[-1])
         self.state = int(self.at["action"][0])
         """Number of numbers of the state."""
@@ -62,11 +65,7 @@ class Vector:
 
     def rows(self, places: Sequence[np.ndarray]) -> np.ndarray:
         """Field of the memory and place in it of numbers of the vector, shape (n, 2)."""
-        names, found = list(self.arrays), []
-        for k in np.concatenate(places):
-            f = next(i for i, name in enumerate(names) if self.at[name][0] <= k <= self.at[name][-1])
-            found.append((f, k - self.at[names[f]][0]))
-        return np.array(found, np.int64).reshape(-1, 2)
+        return self._rows[np.concatenate(places)]
 
     def read_by_patient(self, traits: np.ndarray, newest: int) -> list[np.ndarray]:
         """Places of what a tick may read, where `newest` is the place of its samples."""

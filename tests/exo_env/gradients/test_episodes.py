@@ -61,6 +61,28 @@ def test_gradient_is_that_of_differences(name, mode, rate):
         assert found == pytest.approx(along(run, actions, direction, 1e-6), rel=1e-4)
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"cuff": "compliant"},
+        {"misalignment": {"shift": [0.01, 0.005, 0.0], "tilt_deg": [3.0, 0.0]}},
+        {"control_rate": 1000.0},
+        {"control_rate": 7.0},
+    ],
+    ids=str,
+)
+def test_gradient_in_other_settings_is_that_of_differences(settings):
+    """Other equations, and periods that are far shorter and far longer than the patient's."""
+    env = made(action_mode="assist_moment", **settings)
+    run, actions = WholeEpisode(env, SEEN), some_actions(env, min(max(int(0.3 / env.period), 2), 50))
+    given = torch.tensor(actions, requires_grad=True)
+    weighted(run, given).backward()
+    direction = np.random.default_rng(1).normal(size=actions.shape)
+    found = float((given.grad.numpy() * direction).sum())
+    # As above; behind 0.3 s no muscle has turned round between the ends of a difference.
+    assert found == pytest.approx(along(run, actions, direction, 1e-6), rel=1e-5)
+
+
 def test_gradient_with_free_steps_is_that_of_differences():
     """To the error of the solver, which differences see as noise: 1e-6 over a step of 1e-2."""
     env = made(solver={"rtol": 1e-6}, action_mode="assist_moment")
@@ -93,19 +115,22 @@ def test_gradient_by_declared_numbers_is_that_of_differences():
     np.testing.assert_array_equal(found, steps(env, actions.numpy(), run.period.periods.rows))
 
 
-def test_numbers_stay_moved_when_the_weight_changes():
-    """A weight that is picked up writes all numbers anew; what a period does then is the moved numbers' too."""
+def test_gradient_goes_through_a_change_of_the_weight():
+    """A weight that is picked up writes all numbers of the model anew, over those that were given."""
     env = made(HIDDEN, action_mode="assist_moment")
     loads = env.world.tables.plan.loads
     loads[4:] = loads[0] + 0.3
     run = WholeEpisode(env, ["angle", "rate"], [Number("forearm", "mass")])
-    actions, given = torch.tensor(some_actions(env, 8)), 1.1 * run.period.numbers()
-    given.requires_grad_(True)
-    run(actions, given)[-1, 1].backward()
-    step = 1e-5 * given.detach()
-    with torch.no_grad():
-        high, low = (float(run(actions, given + sign * step)[-1, 1]) for sign in (1.0, -1.0))
-    assert float(given.grad[0]) == pytest.approx((high - low) / (2.0 * float(step[0])), rel=1e-5)
+    given = [torch.tensor(some_actions(env, 8)), 1.1 * run.period.numbers()]
+    for x in given:
+        x.requires_grad_(True)
+    run(*given)[-1, 1].backward()
+    for k, x in enumerate(given):
+        step = 1e-5 * torch.linspace(0.5, 1.0, x.numel(), dtype=torch.float64).reshape(x.shape)
+        with torch.no_grad():
+            ends = [[y + sign * step if y is x else y for y in given] for sign in (1.0, -1.0)]
+            high, low = (float(run(*y)[-1, 1]) for y in ends)
+        assert 2.0 * float((x.grad * step).sum()) == pytest.approx(high - low, rel=1e-4), k
 
 
 def test_a_period_is_the_same_from_the_same_state():
