@@ -20,8 +20,6 @@ class Moment(NamedTuple):
     """State of the equations."""
     arrays: tuple[bytes, ...]
     """Numbers of the model, and arrays of the tables that a reset fills or clears."""
-    change: tuple[np.ndarray, ...] | None
-    """What declared numbers have added to the numbers of the model."""
 
 
 class Moments:
@@ -36,12 +34,12 @@ class Moments:
         self.world, self.episode = world, episode
         self._arrays = [*world.model.numbers, *(x for _, x in arrays_of(world.tables, Filled, Cleared))]
 
-    def now(self, change: tuple[np.ndarray, ...] | None, before: Moment | None = None) -> Moment:
+    def now(self, before: Moment | None = None) -> Moment:
         """The present moment; what has not changed since the one before is held once."""
         arrays = tuple(x.tobytes() for x in self._arrays)
         if before is not None:
             arrays = tuple(old if old == new else new for old, new in zip(before.arrays, arrays, strict=True))
-        return Moment(self.episode, self.world.dynamics.mark(), arrays, change)
+        return Moment(self.episode, self.world.dynamics.mark(), arrays)
 
     def go_to(self, there: Moment) -> None:
         """Put the world back to a moment of this episode, be it the present one."""

@@ -15,7 +15,7 @@ from exo_env.ecosystem.ecosystem import REFERENCE
 from exo_env.world.episodes.episode import Episode
 from exo_env.world.kernels.scaling import TEMPLATE_ANGLE, declared
 
-PARTS = 3
+MOVED_PARTS = 3
 """Arrays of `Model.numbers` that declared numbers move: of dynamics, constraints and sensors."""
 
 
@@ -23,7 +23,7 @@ class Moved(NamedTuple):
     """The numbers of a model where declared numbers have other values."""
 
     change: tuple[np.ndarray, ...]
-    """What is added to each of the first PARTS of `Model.numbers`."""
+    """What is added to each of the first MOVED_PARTS of `Model.numbers`."""
     model: Model
     """A model that declares the moved numbers."""
     directions: list[Direction]
@@ -71,7 +71,9 @@ class DeclaredNumbers:
         model = own.at(values)
         if self._last[0] is not model or self._last[1] is None:
             # Sizes and welds, which follow, are those of the declaration.
-            change = tuple(new - old for new, old in zip(model.numbers[:PARTS], own.model.numbers[:PARTS], strict=True))
+            change = tuple(
+                new - old for new, old in zip(model.numbers[:MOVED_PARTS], own.model.numbers[:MOVED_PARTS], strict=True)
+            )
             directions = [model.parameter_derivatives.direction(*x) for x in self.numbers]
             self._last = model, Moved(change, model, directions)
         assert self._last[1] is not None

@@ -15,7 +15,7 @@ from exo_env.envs.base_env import AssistanceEnv
 from exo_env.gradients.kernels import PARTS, difference_part, do_part, record_steps
 from exo_env.gradients.maps import Map, copied
 from exo_env.gradients.moments import Moment, Moments
-from exo_env.gradients.numbers import DeclaredNumbers, Moved
+from exo_env.gradients.numbers import MOVED_PARTS, DeclaredNumbers, Moved
 from exo_env.gradients.tangents import Tangents
 from exo_env.gradients.vector import Vector
 from exo_env.patient.excitation.effort import PRESENT, TICK
@@ -60,7 +60,6 @@ class Periods:
         self._memory = np.array([(x.ctypes.data, x.size, 1) for x in memory], np.int64)
         self._kept, self._rows = np.zeros(sum(x.size for x in memory)), np.zeros((ROWS, 1 + 2 * self.world.model.n_q))
         self._tangents = Tangents(self.world, self.vector)
-        self._change: tuple[np.ndarray, ...] | None = None
         self._moments = Moments(self.world, self.episode)
         self._seen: Node | None = None
         self._seen_at: Moment | None = None
@@ -68,7 +67,7 @@ class Periods:
 
     def start(self) -> tuple[np.ndarray, Moment]:
         """Numbers of the state, and the moment, now."""
-        return self._state(), self._moments.now(self._change)
+        return self._state(), self._moments.now()
 
     def run(self, there: Moment, state: np.ndarray, action: np.ndarray, numbers: np.ndarray, slopes: bool) -> Ran:
         """Do the control period that begins at a moment.
@@ -86,34 +85,42 @@ class Periods:
         """
         self._check(there)
         self._go_to(there, state)
-        w, maps = self.world.packed.table, []
-        status, drive = self.world.tables.status, self.world.tables.drive
+        drive = self.world.tables.drive
         drive.before[:], drive.action[:] = drive.action, action
-        do_part(w, PARTS.load)
+        do_part(self.world.packed.table, PARTS.load)
+        own = [x.copy() for x in self.world.model.numbers[:MOVED_PARTS]]
         moved = self._put_numbers(numbers)
+        try:
+            maps = self._move(moved, slopes)
+        finally:
+            # What steps the environment next finds the numbers of its episode.
+            self._put_own(own)
+        self._seen_at = self._moments.now(there)
+        return Ran(self._state(), self.world.tables.dynamics.y[self.rows].copy(), self._seen_at, maps)
+
+    def _move(self, moved: Moved | None, slopes: bool) -> list[Map]:
+        """The period under way: drive, patient and equations, from one event to the next, then what follows."""
+        world, period = self.world, self.env.period
+        w, status, ticks, maps = world.packed.table, world.tables.status, world.tables.patient.ticks, []
+        start, end = status[STATUS.step] * period, (status[STATUS.step] + 1) * period
         if slopes:
             self._tangents.renew(moved)
             maps += [self._felt(moved), *self._drive()]
         do_part(w, PARTS.drive)
-        start = status[STATUS.step] * self.env.period
-        end = (status[STATUS.step] + 1) * self.env.period
-        while self.world.dynamics.time < end:
-            if self.world.tables.patient.ticks[0] * TICK <= self.world.dynamics.time + SAME_TIME:
-                if self.world.dynamics.time > start:
+        while world.dynamics.time < end:
+            if ticks[0] * TICK <= world.dynamics.time + SAME_TIME:
+                if world.dynamics.time > start:
                     do_part(w, PARTS.sense)
                     self._seen = None
                     maps += [self._felt(moved)] if slopes else []
                 maps += self._patient() if slopes else []
                 do_part(w, PARTS.patient)
             maps += self._advance(next_stop(w), slopes)
-            w = self.world.packed.table
+            w = world.packed.table
         status[STATUS.code] = DONE
         do_part(w, PARTS.finish)
         self._seen = None
-        maps += [self._read(moved)] if slopes else []
-        read = self.world.tables.dynamics.y[self.rows].copy()
-        self._seen_at = self._moments.now(self._change, there)
-        return Ran(self._state(), read, self._seen_at, maps)
+        return maps + [self._read(moved)] if slopes else []
 
     def _check_drive(self) -> None:
         """Refuse a drive that reads more than the action and the hinge's angle."""
@@ -147,7 +154,6 @@ class Periods:
     def _go_to(self, there: Moment, state: np.ndarray) -> None:
         """Put the world to a moment, with a state that may differ from that one's."""
         self._moments.go_to(there)
-        self._change = there.change
         if there is not self._seen_at:
             self._seen = None
         if self.world.tables.status[STATUS.step] >= self.env.steps:
@@ -183,23 +189,20 @@ class Periods:
         do_part(self.world.packed.table, PARTS.sense)
 
     def _put_numbers(self, values: np.ndarray) -> Moved | None:
-        """Give declared numbers their values; what they move is written into the model's numbers."""
+        """Give declared numbers their values: what they move is added to the model's numbers."""
         if not (self.numbers.numbers or len(values)):
             return None
-        loads, step = self.world.tables.plan.loads, self.world.tables.status[STATUS.step]
-        moved = self.numbers.at(values, float(loads[step]))
-        if step and loads[step] != loads[step - 1]:
-            # With another load all numbers were written anew.
-            self._change = None
-        if self._change is not moved.change:
-            into, before = self.world.model.numbers, self._change or tuple(np.zeros_like(x) for x in moved.change)
-            for k, change in enumerate(moved.change):
-                into[k][...] += change - before[k]
-            if any((x != y).any() for x, y in zip(moved.change, before, strict=True)):
-                renumber(self.world.dynamics.packed.table)
-                self._seen = None
-            self._change = moved.change
+        load = self.world.tables.plan.loads[self.world.tables.status[STATUS.step]]
+        moved = self.numbers.at(values, float(load))
+        self._put_own([x + y for x, y in zip(self.world.model.numbers[:MOVED_PARTS], moved.change, strict=True)])
         return moved
+
+    def _put_own(self, numbers: list[np.ndarray]) -> None:
+        """Write numbers of the model, where they are others."""
+        for into, x in zip(self.world.model.numbers[:MOVED_PARTS], numbers, strict=True):
+            if (into != x).any():
+                into[...] = x
+                renumber(self.world.dynamics.packed.table)
 
     def _difference(self, part: int, written: list[np.ndarray], read: list[np.ndarray]) -> Map:
         """The map of drive or patient."""

@@ -100,7 +100,7 @@ def test_gradient_by_declared_numbers_is_that_of_differences():
         Number("agonist", "path.0.point.0"),
     ]  # fmt: skip
     env = made(action_mode="assist_moment")
-    run = WholeEpisode(env, SEEN, numbers)
+    run, again = WholeEpisode(env, SEEN, numbers), WholeEpisode(env, SEEN)
     actions, declared = torch.tensor(some_actions(env, 12)), run.period.numbers()
     given = (1.01 * declared).requires_grad_(True)
     weighted(run, actions, given).backward()
@@ -110,6 +110,9 @@ def test_gradient_by_declared_numbers_is_that_of_differences():
         with torch.no_grad():
             high, low = (float(weighted(run, actions, given + sign * step)) for sign in (1.0, -1.0))
         assert float(given.grad[k]) == pytest.approx((high - low) / (2.0 * float(step[k])), rel=1e-5), numbers[k].name
+    # The environment that is stepped next has its own numbers.
+    run(actions[:1], given)
+    np.testing.assert_array_equal(again(actions[:3]).detach(), run(actions[:3], declared).detach())
     with torch.no_grad():
         found = run(actions, declared).numpy()
     np.testing.assert_array_equal(found, steps(env, actions.numpy(), run.period.periods.rows))
