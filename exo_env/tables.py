@@ -174,6 +174,32 @@ class ObserverTables(NamedTuple):
     """The observation, in the scales of the channels, shape (n,)."""
 
 
+class EstimatorTables(NamedTuple):
+    """The filter of the device, where an agent is shown what it estimates; see estimation/reduced_filter.py."""
+
+    sensors: ObserverTables
+    """What the device measures: channels with the noise of the group `device`, whether or not an agent sees them."""
+    numbers: Kept
+    """Numbers of the filter, at the places of NUMBERS."""
+    curves: Kept
+    """Table over the angle with the columns of CURVES."""
+    disturbance: Kept
+    """Covariance that a unit of net's power adds in a period, shape (3, 3)."""
+    target: Kept
+    """Place in the readings, and among the estimates, of each reading that is one, shape (k, 2)."""
+    sensed: Cleared
+    """Present measurements in their units, at the places of SENSED."""
+    mean: Cleared
+    """What is believed, at the places of BELIEF."""
+    fast: Cleared
+    slow: Cleared
+    """Covariances, shapes (4, 4) and (2, 2)."""
+    learnt: Cleared
+    """What is learnt on the way, at the places of LEARNT."""
+    estimates: Cleared
+    """Estimates and their standard deviations, at the places of ESTIMATE."""
+
+
 class DrawTables(NamedTuple):
     """The draw of the episode that a reset begins."""
 
@@ -271,6 +297,7 @@ class WorldTables(NamedTuple):
     plan: PlanTables
     task: TaskTables
     observer: ObserverTables
+    estimator: EstimatorTables
     draw: DrawTables
     scaling: ScalingTables
     subject: SubjectTables
@@ -285,10 +312,10 @@ class WorldTables(NamedTuple):
     """Results of the last reset, at the places of OUTCOME."""
 
 
-DYNAMICS, DRIVE, PATIENT_TABLES, PLAN, TASK, OBSERVER, DRAW, SCALING, SUBJECT, REST, WORLD, EFFORT = map(
+DYNAMICS, DRIVE, PATIENT_TABLES, PLAN, TASK, OBSERVER, ESTIMATOR, DRAW, SCALING, SUBJECT, REST, WORLD, EFFORT = map(
     fields,
     (
-        DynamicsTables, DriveTables, PatientTables, PlanTables, TaskTables, ObserverTables, DrawTables, ScalingTables,
-        SubjectTables, RestTables, WorldTables, EffortState,
+        DynamicsTables, DriveTables, PatientTables, PlanTables, TaskTables, ObserverTables, EstimatorTables, DrawTables,
+        ScalingTables, SubjectTables, RestTables, WorldTables, EffortState,
     ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ none              both ropes slack; at the start the agonist still holds the arm
 pid               the paper's PID: the device's own controller, full authority, the reference as its setpoint
 pid_yielding      the same with part of the authority, behind the reference by a constant angle, see lagging_pid.py
 pid_compensated   such a one with part of the tension that arm, device and load need, see compensation.py
+pid_estimated     the same for an average arm and the load that the device estimates, see estimated_load.py
 assist_as_needed  learns that tension and forgets it, see assist_as_needed.py
 
 Where the patient's plan is hidden there are `none` and those of the folder reference_free. `oracle` is told the plan.
@@ -25,6 +26,7 @@ from dms_core.errors import InputError, choices
 from .assist_as_needed import AssistAsNeeded
 from .batch_policy import BatchPolicy, one_world
 from .compensation import CompensatedPid
+from .estimated_load import EstimatedLoadPid
 from .lagging_pid import LaggingPid
 from .policy import Policy
 from .reference_free.adaptive_gravity import AdaptiveGravity
@@ -32,6 +34,8 @@ from .reference_free.admittance import Admittance
 from .reference_free.disturbance_observer import DisturbanceObserver
 from .reference_free.emg_proportional import EmgProportional
 from .reference_free.gravity import Gravity, GravityLoad
+from .reference_free.intent_pd import IntentPd
+from .reference_free.lack_assist import LackAssist
 from .reference_free.mean_movement import MeanAngle, MeanClock
 from .reference_free.onset import Onset
 from .reference_free.oracle import Oracle, SoftOracle
@@ -65,14 +69,14 @@ class PidControl(Policy):
 
 
 FOLLOWING: dict[str, type[Policy]] = {
-    p.name: p for p in (NoAssistance, PidControl, LaggingPid, CompensatedPid, AssistAsNeeded)
+    p.name: p for p in (NoAssistance, PidControl, LaggingPid, CompensatedPid, EstimatedLoadPid, AssistAsNeeded)
 }
 """Policies for tasks whose reference is shown."""
 REFERENCE_FREE: dict[str, type[BatchPolicy]] = {
     p.name: p
     for p in (
         NoAssistance, Gravity, GravityLoad, EmgProportional, Admittance, AdaptiveGravity, Onset, DisturbanceObserver,
-        MeanClock, MeanAngle, Oracle, SoftOracle,
+        LackAssist, IntentPd, MeanClock, MeanAngle, Oracle, SoftOracle,
     )
 }  # fmt: skip
 """Policies for tasks whose plan is hidden, with the oracle."""

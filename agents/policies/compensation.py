@@ -80,17 +80,19 @@ class CompensatedPid(Policy):
 
     def __call__(self, observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
         """The setpoint change that stands for the holding tension and the lag, and the authority."""
-        if self._tensions is None:
-            self._tensions = self._table(observation)
-        held = float(np.interp(self._channels.read(observation, "device.preview", AHEAD), ANGLES, self._tensions))
+        held = float(
+            np.interp(self._channels.read(observation, "device.preview", AHEAD), ANGLES, self.held(observation))
+        )
         gains = self._ecosystem.device.gains
         change = (self.share * held - gains.ki * self._integral) / gains.kp
         change = min(max(change, self.lag - self._range), self._range)
         self._integral += change * self._period
         return np.array([(change - self.lag) / self._range, 2.0 * self.authority - 1.0]).clip(-1.0, 1.0)
 
-    def _table(self, observation: np.ndarray) -> np.ndarray:
-        """Holding tension of this patient and load over ANGLES [N]."""
-        read = self._channels.read
-        mass, height, load = (read(observation, f"privileged.{name}") for name in ("body_mass", "height", "load"))
-        return holding_tensions(self._ecosystem, Person(body_mass=mass, height=height), load, ANGLES)
+    def held(self, observation: np.ndarray) -> np.ndarray:
+        """Holding tension of this patient and load over ANGLES [N]; they stay the same in an episode."""
+        if self._tensions is None:
+            read = self._channels.read
+            mass, height, load = (read(observation, f"privileged.{name}") for name in ("body_mass", "height", "load"))
+            self._tensions = holding_tensions(self._ecosystem, Person(body_mass=mass, height=height), load, ANGLES)
+        return self._tensions

@@ -160,6 +160,8 @@ class Sensitivity:
         wanted = {self._sensor(o) for o, w in zip(self.of, self._weights[row], strict=True)
                   if w != 0.0 and not self._is_state(o)}  # fmt: skip
         rows = sorted(wanted)
+        if not rows:
+            return rows, Node(*(np.zeros((0, 0)),) * len(Node._fields))
         point = self.replay.point(row)
         return rows, node(self.model, point, np.array(rows, int), self.numbers, self.replay.directions)
 

@@ -358,7 +358,7 @@ class AssistanceEnv(Copied, gymnasium.Env):
 
     def reading_units(self) -> dict[str, str]:
         """Unit of each sensor and reading in `readings`."""
-        units = {reading.name: reading.unit for reading in self.task.readings if not reading.sensors}
+        units = {reading.name: reading.unit for reading in self.readout.known_readings() if not reading.sensors}
         return dict(self.episode.model.layout.outputs) | units
 
     def start_info(self) -> dict[str, Any]:

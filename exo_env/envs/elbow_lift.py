@@ -75,9 +75,11 @@ class ElbowLiftEnv(AssistanceEnv):
     | 2   | gravity share      | -1  | 1   | 0           | 4           | -         |
 
     ## Observation Space
-    `Box`, float32, of the groups in `observation`: "device" (the default) is what a worn exoskeleton can measure, "emg"
-    noisy activations, "privileged" the patient's parameters and true muscle forces. An observation times its scale is
-    the reading in its unit; `env.unwrapped.observation_structure` says the same of every group. Of "device":
+    `Box`, float32, of the groups in `observation`: "device" (the default) is what a worn exoskeleton can measure,
+    "estimated" what a Kalman filter in it makes of that (moments, load and effort, each with its standard deviation:
+    `exo_env/tasks/observation/estimates.py`), "emg" noisy activations, "privileged" the patient's parameters and true
+    muscle forces. An observation times its scale is the reading in its unit; `env.unwrapped.observation_structure` says
+    the same of every group. Of "device":
 
     | Num | Observation                   | Min  | Max | Unit  | Scale |
     |-----|-------------------------------|------|-----|-------|-------|

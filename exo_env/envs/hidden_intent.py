@@ -74,7 +74,10 @@ class HiddenIntentEnv(AssistanceEnv):
     | 5   | last_action, first    | -1   | 1   | -     | 1     |
     | 6   | last_action, second   | -1   | 1   | -     | 1     |
 
-    "emg" has six envelopes with unknown gains, crosstalk, delay, noise, channels that drop out and electrodes that are
+    "estimated" is what a Kalman filter in the device makes of angle, rate and guide force: the moment of all but the
+    device, that of the muscles, the intended one, load and effort, each with its standard deviation
+    (`exo_env/tasks/observation/estimates.py`); without EMG it cannot tell muscles from load, and says so. "emg" has six
+    envelopes with unknown gains, crosstalk, delay, noise, channels that drop out and electrodes that are
     put on anew (`exo_env/tasks/observation/electrodes.py`); "imu" the forearm's rate and specific force; "privileged"
     the patient's traits, true states and the plan; "clock" the time since the episode began, which no worn device knows
     and only an ablation may see. Groups and single channels ("emg.emg") are composed by name.

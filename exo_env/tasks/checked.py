@@ -13,6 +13,7 @@ from typing import Any
 
 from dms_core.errors import InputError, choices
 from dms_core.validation import plain
+from exo_env.estimation.reduced_filter import ESTIMATE
 from exo_env.kernel_checks import check_kernel, uses
 from exo_env.patient.patient import FIELDS
 from exo_env.tasks.observation.channels import Channel, Parts, Reading
@@ -81,6 +82,11 @@ def check_readings(task: str, readings: Sequence[Reading]) -> None:
             raise InputError(f"{who}: trait '{r.trait}' is unknown; a patient has {choices(FIELDS)}.")
         if r.trait is not None and (r.sensors or len(r.labels) > 1):
             raise InputError(f"{who} shows the trait '{r.trait}'; expected one component and no sensors.")
+        if r.estimate is not None and r.estimate not in ESTIMATE._fields:
+            known = choices(ESTIMATE._fields)
+            raise InputError(f"{who}: estimate '{r.estimate}' is unknown; the device's filter estimates {known}.")
+        if r.estimate is not None and (r.sensors or r.trait or len(r.labels) > 1):
+            raise InputError(f"{who} shows the estimate '{r.estimate}'; expected one component, no sensors, no trait.")
     twice = repeated(r.name for r in readings)
     if twice is not None:
         raise InputError(f"{task}: reading '{twice}' is declared twice; expected different names.")

@@ -30,6 +30,7 @@ from exo_env.tasks.movements.intentions import Intentions
 from exo_env.tasks.movements.movement import Movement
 from exo_env.tasks.observation.channels import Channel, Imperfection, Parts, Reading
 from exo_env.tasks.observation.electrodes import Electrodes, electrode_draws, put_envelopes
+from exo_env.tasks.observation.estimates import estimated_channels, estimated_readings
 from exo_env.tasks.task import Reported, first_of, readings, step_of, terms_of
 
 EPISODES_RENEWED = 0.1
@@ -123,11 +124,11 @@ class HiddenIntentTask(ElbowTask):
         super().__init__(parts, weights, limits)
 
     def declared_readings(self, parts: Parts) -> list[Reading]:
-        """The readings of `intent_readings`."""
-        return intent_readings(parts)
+        """The readings of `intent_readings`, and what the device's filter estimates."""
+        return [*intent_readings(parts), *estimated_readings()]
 
     def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
-        """What a device measures, without reference or clock; EMG; an inertial sensor; all that is known; a clock.
+        """What a device measures, without reference or clock, and estimates; EMG; inertial sensor; truth; a clock.
 
         Noise of the inertial sensor on the wrist is assumed: a consumer sensor behind a filter of 20 Hz.
         """
@@ -144,6 +145,7 @@ class HiddenIntentTask(ElbowTask):
         ]
         return {
             "device": [*device_channels(), action_channel()],
+            "estimated": estimated_channels(),
             "emg": [Channel("emg", 1.0, 0.0, 2.0, Imperfection(deviation=0.03, delay=0.02))],
             "imu": [
                 Channel("gyro", 1.0, -20.0, 20.0, Imperfection(deviation=0.02)),

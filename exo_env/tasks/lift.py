@@ -22,6 +22,7 @@ from exo_env.tasks.judgement.rewards import TRACKING_WIDTH, Weights
 from exo_env.tasks.movements.movement import Movement
 from exo_env.tasks.movements.repetition import Repetitions
 from exo_env.tasks.observation.channels import Channel, Parts, Reading
+from exo_env.tasks.observation.estimates import estimated_channels, estimated_readings
 from exo_env.tasks.task import Reported, first_of
 
 
@@ -62,11 +63,11 @@ class LiftTask(ElbowTask):
     read, judge = _read, _judge
 
     def declared_readings(self, parts: Parts) -> list[Reading]:
-        """The readings of `lift_readings`."""
-        return lift_readings(parts)
+        """The readings of `lift_readings`, and what the device's filter estimates."""
+        return [*lift_readings(parts), *estimated_readings()]
 
     def declared_groups(self, parts: Parts) -> dict[str, list[Channel]]:
-        """Three groups: what a device measures, with the reference; EMG; and what only a simulation knows."""
+        """What a device measures, with the reference; what it estimates; EMG; and what only a simulation knows."""
         reference = [
             Channel("reference", 1.0, -0.5, 3.0),
             Channel("reference_rate", 1.0, -20.0, 20.0),
@@ -74,6 +75,7 @@ class LiftTask(ElbowTask):
         ]
         return {
             "device": [*device_channels(), *reference, action_channel()],
+            "estimated": estimated_channels(),
             "emg": emg_channels(),
             "privileged": privileged_channels(),
         }

@@ -23,6 +23,7 @@ Words of exo_env, each for one thing:
     command        input of the model that a drive sets, such as the tension of a rope
     sensor         a quantity of the dms_core model, without noise (ecosystem/sensors.py); y holds all their components
     reading        true numbers that a task knows: copied sensors, traits, or what its kernel puts there
+    estimate       what the device's own filter makes of its measurements; a reading like others where it is shown
     channel        a reading as an agent sees it: in a scale, with an imperfection; groups hold channels
     imperfection   noise, delay and quantum of a channel
     component      one number of a reading, a channel or a sensor

@@ -36,6 +36,7 @@ from exo_env.tables import (
     DrawTables,
     DriveTables,
     DynamicsTables,
+    EstimatorTables,
     ObserverTables,
     PatientTables,
     PlanTables,
@@ -51,6 +52,7 @@ from exo_env.tasks.observation.channels import first_places
 from exo_env.tasks.observation.observer import Observer
 from exo_env.tasks.task import Task
 from exo_env.world.draw import Draw
+from exo_env.world.estimator import estimator_tables
 from exo_env.world.kernels.episode_code import EPISODE_CODE
 from exo_env.world.kernels.reset import BEGUN, GAPING, NO_RATES, PULLEY_IN_REACH, UNSETTLED, begin_episode, settle
 from exo_env.world.kernels.scaling import TEMPLATE_ANGLE, declared, scaling_of
@@ -125,7 +127,8 @@ class PatientWorld:
         self.dynamics = World(self.model, self.options)
         values = WorldTables(
             dynamics=self._dynamics(), drive=self._drive(), patient=self._patient(), plan=self._plan(),
-            task=self._task(), observer=self._observer(), draw=self._draw(), scaling=self._scaled(),
+            task=self._task(), observer=self._observer(), estimator=self._estimator(), draw=self._draw(),
+            scaling=self._scaled(),
             subject=self._subject(), rest=self._rest(), period=np.array([self.period]),
             cleared=np.zeros((0, 2), np.int64), status=np.zeros(len(STATUS), np.int64), outcome=np.zeros(len(OUTCOME)),
         )  # fmt: skip
@@ -198,12 +201,20 @@ class PatientWorld:
         )  # fmt: skip
 
     def _observer(self) -> ObserverTables:
-        o, k = self.observer, len(self.times)
+        return self._seen_by(self.observer, self._ticks)
+
+    def _seen_by(self, o: Observer, ticks: int) -> ObserverTables:
+        """Tables of an observer, with a number of the tremor for each tick."""
         return ObserverTables(
             columns=o.columns, imperfections=o.imperfections,
-            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(self._ticks),
-            noise=np.zeros((k, o.size)), memory=o.memory(), observation=np.zeros(o.size),
+            streams=np.array([stream("tremor"), *o.streams]).view(np.int64), tremor=np.zeros(ticks),
+            noise=np.zeros((len(self.times), o.size)), memory=o.memory(), observation=np.zeros(o.size),
         )  # fmt: skip
+
+    def _estimator(self) -> EstimatorTables:
+        return estimator_tables(
+            self.observer, self.task, self.ecosystem, self.period, lambda device: self._seen_by(device, 0)
+        )
 
     def _draw(self) -> DrawTables:
         movement, task = np.zeros(self.movement.size(self.duration)), np.zeros(len(self.task.draws()))

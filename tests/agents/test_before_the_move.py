@@ -72,6 +72,7 @@ def test_a_policy_from_a_training_and_a_population_file_are_evaluated(trainings,
     assert episode["patient"]["slacking_rate"] == 0.6 and 0.5 <= episode["patient"]["strength"] <= 0.8
 
 
+@pytest.mark.slow
 def test_a_report_takes_evaluations_and_trainings(trainings, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     pytest.importorskip("sb3_contrib")
@@ -82,31 +83,31 @@ def test_a_report_takes_evaluations_and_trainings(trainings, tmp_path, monkeypat
     assert "| ppo | ppo | 0 |" in text and "weak and forgetful" in text and "Worst patient" in text
 
 
-@pytest.mark.parametrize(
-    "old, new",
-    [
-        ("learned", "policies.learned"),
-        ("train", "training.run"),
-        ("evaluate", "evaluation.comparison.evaluate"),
-        ("evaluation.evaluate", "evaluation.comparison.evaluate"),
-        ("training.config", "training.settings.config"),
-        ("commands.video", "commands.pictures.video"),
-        ("traces", "training.wrappers.low_pass"),
-        ("rllib", "distributed.rllib"),
-    ],
-)
-def test_old_imports_work_with_a_warning(old, new):
+def test_old_imports_work_with_a_warning():
     pytest.importorskip("sb3_contrib")
+    names = {
+        "learned": "policies.learned",
+        "train": "training.run",
+        "evaluate": "evaluation.comparison.evaluate",
+        "evaluation.evaluate": "evaluation.comparison.evaluate",
+        "training.config": "training.settings.config",
+        "commands.video": "commands.pictures.video",
+        "traces": "training.wrappers.low_pass",
+        "rllib": "distributed.rllib",
+    }
     code = (
-        "import importlib, warnings; warnings.simplefilter('error', FutureWarning)\n"
-        f"try: import agents.{old}\n"
-        "except FutureWarning as warning: print(warning)\n"
-        "warnings.simplefilter('ignore')\n"
-        f"print(importlib.import_module('agents.{old}') is importlib.import_module('agents.{new}'))"
+        "import importlib, warnings\n"
+        f"for old, new in {names}.items():\n"
+        "    warnings.simplefilter('error', FutureWarning)\n"
+        "    try: importlib.import_module('agents.' + old)\n"
+        "    except FutureWarning as warning: print(warning)\n"
+        "    warnings.simplefilter('ignore')\n"
+        "    print(importlib.import_module('agents.' + old) is importlib.import_module('agents.' + new))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines() == [f"'agents.{old}' is now 'agents.{new}'; import it by that name.", "True"]
+    said = [[f"'agents.{old}' is now 'agents.{new}'; import it by that name.", "True"] for old, new in names.items()]
+    assert done.stdout.splitlines() == sum(said, [])
 
 
 def test_a_module_that_moved_within_its_folder_comes_from_there():

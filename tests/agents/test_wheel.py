@@ -72,6 +72,7 @@ def test_shipped_policies_and_baselines_act_by_import(run, installed):
     assert names.endswith(f"{shipped_policies()} []")
 
 
+@pytest.mark.slow
 def test_policies_are_evaluated_and_trained(run, tmp_path):
     pytest.importorskip("matplotlib")
     pytest.importorskip("sb3_contrib")
@@ -88,6 +89,7 @@ def test_policies_are_evaluated_and_trained(run, tmp_path):
     assert json.loads((out / "run" / "run.json").read_text())["sessions"][0]["git"] is None
 
 
+@pytest.mark.slow
 def test_messages_and_old_names_have_the_installed_name(run):
     done = run("-m", "exo_agents", "evaluate", "--policy", "model.zip", "--out", "out")
     assert done.returncode == 2 and "python -m exo_agents export model.zip --trust" in done.stderr

@@ -53,7 +53,7 @@ ORDER = {
         "lift",
         "hidden_intent",
     ),
-    "exo_env.world": ("draw", "work_sharing", "kernels", "world", "batch", "episodes"),
+    "exo_env.world": ("draw", "work_sharing", "kernels", "estimator", "world", "batch", "episodes"),
 }
 """What a folder holds: each may import those before it."""
 

@@ -20,8 +20,8 @@ from ...policies.tuned import HIDDEN_INTENT, tuned
 
 RETURNS = "training_return"
 """Key of the file of tuned numbers: the mean return of each policy on the training patients, by its name."""
-ALWAYS = frozenset({"device"})
-"""Groups that every opponent may see."""
+ALWAYS = frozenset({"device", "estimated"})
+"""Groups that every opponent may see: what a device measures, and what it makes of that without another sensor."""
 
 
 def training_returns() -> dict[str, float]:

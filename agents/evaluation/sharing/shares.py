@@ -8,7 +8,10 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
+
+from dms_core.errors import SimulationError
 
 ShareOut = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
 """Takes a function and the arguments of each share; gives what the calls return, in the order of the shares."""
@@ -18,7 +21,11 @@ FORGETTING = 0.5
 
 @contextlib.contextmanager
 def processes(workers: int) -> Iterator[ShareOut]:
-    """Processes of this machine, which end without a word when the user stops the command."""
+    """Processes of this machine, which end without a word when the user stops the command.
+
+    Raises:
+        SimulationError: one of them was killed, by the system where memory is short.
+    """
     with ProcessPoolExecutor(workers, initializer=_leave_signals_alone) as pool:
         before = set(multiprocessing.active_children())
         try:
@@ -30,6 +37,11 @@ def processes(workers: int) -> Iterator[ShareOut]:
             for child in set(multiprocessing.active_children()) - before:
                 child.kill()
             raise
+        except BrokenProcessPool:
+            raise SimulationError(
+                "a worker process was killed before its share was done; does the machine have memory for as many "
+                "--workers? What is done is kept, and the same command goes on from there."
+            ) from None
 
 
 def _leave_signals_alone() -> None:

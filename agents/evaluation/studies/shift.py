@@ -83,7 +83,9 @@ def _bias(plan: Plan, policy: Policy, part: float) -> Plan:
 
 
 def _faulty(plan: Plan, policy: Policy, change: Callable[[Imperfection, float], Imperfection]) -> Plan:
-    """Changed imperfections of what sensors show the policy: not of its own action, nor of what none measures.
+    """Changed imperfections of what sensors show the policy, or the filter whose estimates it is shown.
+
+    Neither its own action nor what no sensor measures is changed.
 
     Args:
         plan: of the policy.
@@ -92,9 +94,9 @@ def _faulty(plan: Plan, policy: Policy, change: Callable[[Imperfection, float], 
     """
     world: Any = make(plan.environment, action_mode=policy.action_mode, observation=list(policy.observation)).unwrapped
     shown = {
-        f"{group}.{channel.name}": (channel.imperfection, channel.scale)
-        for group, channel in world.observer.channels
-        if group not in world.task.revealing and channel.name != action_channel().name
+        name: (channel.imperfection, channel.scale)
+        for name, channel in world.observer.measured.items()
+        if name.partition(".")[0] not in world.task.revealing and channel.name != action_channel().name
     }
     changed = {name: (change(one, scale), one) for name, (one, scale) in shown.items()}
     noise = {name: new.model_dump() for name, (new, one) in changed.items() if new != one}

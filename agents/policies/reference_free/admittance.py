@@ -55,12 +55,16 @@ class Admittance(AssistMoment):
         """The virtual joint begins at the arm."""
         self._angle, self._rate = seen.angle.copy(), np.zeros_like(seen.rate)
 
+    def will(self, observations: np.ndarray, seen: Seen) -> np.ndarray:
+        """What the patient gives beyond the weight [Nm], shape (n,)."""
+        pushed = self.channels.columns(observations, "device.guide_force")[0] * self._distance
+        # The guide gives the arm what the ropes give beyond the link's own weight.
+        return self.weight(seen.angle) - self.link(seen.angle) - pushed
+
     def wanted(self, observations: np.ndarray, seen: Seen) -> np.ndarray:
         """The moment that follows the virtual joint."""
         x = self.numbers
-        pushed = self.channels.columns(observations, "device.guide_force")[0] * self._distance
-        # The guide gives the arm what the ropes give beyond the link's own weight.
-        will = self.weight(seen.angle) - self.link(seen.angle) - pushed
+        will = self.will(observations, seen)
         will = np.sign(will) * np.maximum(np.abs(will) - x["dead"], 0.0)
         self._rate = (self._rate + self.period * will / x["mass"]) / (1.0 + self.period * x["drag"] / x["mass"])
         ahead = self._angle + self.period * self._rate

@@ -1,8 +1,9 @@
 """Readings and channels: what a task knows of a world, and what of it an observer is shown.
 
 A reading is one or several true numbers under a name: copied from sensors of the model, taken from a trait of the
-patient, or put there by the task's kernel. A channel shows a reading: in a scale, within a range, through an
-imperfection. Channels stand in groups, and any number of them may show the same reading.
+patient, or put there by the task's kernel; or it is what the device's own filter estimates. A channel shows a reading:
+in a scale, within a range, through an imperfection. Channels stand in groups, and any number of them may show the same
+reading.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ class Reading:
     """Components of the model's sensors that are copied, one for each component; none: the task's kernel fills it."""
     trait: str | None = None
     """Name of the patient's trait that the reading is, None where it is none."""
+    estimate: str | None = None
+    """Name of the estimate of the device's filter that the reading is (estimates.py), None where it is none."""
 
 
 class Imperfection(Settings):

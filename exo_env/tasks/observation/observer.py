@@ -6,7 +6,7 @@ stands in two groups may be seen twice, under both names.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from dms_core.validation import plain
 from exo_env.settings import given_mapping
 from exo_env.streams import streams
 from exo_env.tasks.observation.channels import Channel, Imperfection, Reading, Slice, first_places
+from exo_env.tasks.observation.estimates import SENSORS
 from exo_env.tasks.observation.noise import IMPERFECTION
 
 
@@ -40,6 +41,16 @@ class Observer:
         period: float,
     ) -> None:
         self.channels = _chosen(observation, groups)
+        estimates = {r.name for r in readings if r.estimate is not None}
+        estimated = [c for _, c in self.channels if c.source in estimates]
+        self.device: Observer | None = None
+        """What the device's filter sees, where one of the channels shows an estimate: as noisy as an agent sees it."""
+        if estimated:
+            _check_sensors(estimated[0], groups, {r.name: r for r in readings})
+            self.device = Observer(SENSORS, readings, groups, _noise_of(SENSORS, noise), period)
+        measured = [x for x in self.channels if x[1] not in estimated] + (self.device.channels if self.device else [])
+        self.measured = {f"{group}.{c.name}": c for group, c in measured}
+        """Channels whose imperfections count, by "group.channel": those shown but for estimates, and the filter's."""
         self._readings = {r.name: (r, int(place)) for r, place in zip(readings, first_places(readings), strict=False)}
         self.structure = self._slices()
         self.size = self.structure[-1].stop
@@ -79,12 +90,13 @@ class Observer:
             InputError: `noise` is of another kind, or names a channel that is not observed.
         """
         if isinstance(noise, Mapping):
-            names = {name for group, c in self.channels for name in (c.name, f"{group}.{c.name}")}
+            names = _names(self.channels)
+            filtered = set[str]() if self.device is None else _names(self.device.channels)
             for name in noise:
-                if name not in names:
+                if name not in names | filtered:
                     seen = choices({c.name for _, c in self.channels})
                     raise InputError(f"noise: channel '{name}' is not observed; there are {seen}.")
-            given = {name: _imperfection(name, value) for name, value in noise.items()}
+            given = {name: _imperfection(name, value) for name, value in noise.items() if name in names}
             return [
                 given.get(f"{group}.{c.name}", given.get(c.name, c.imperfection)) for group, c in self.channels
             ]  # fmt: skip
@@ -103,6 +115,34 @@ class Observer:
     def memory(self) -> np.ndarray:
         """Room for the past readings of one world, shape (depth, size)."""
         return np.zeros((int(self.imperfections[:, IMPERFECTION.whole].max()) + 2, self.size))
+
+
+def _check_sensors(shown: Channel, groups: Mapping[str, Sequence[Channel]], readings: Mapping[str, Reading]) -> None:
+    """Check that a task has what the device's filter sees.
+
+    Raises:
+        InputError: a channel of the device is missing, or shows several numbers.
+    """
+    known = {f"{group}.{c.name}": c for group, channels in groups.items() for c in channels}
+    for name in SENSORS:
+        if name not in known or len(readings[known[name].source].labels) != 1:
+            raise InputError(
+                f"observation: channel '{shown.name}' shows an estimate, which the device makes of "
+                f"{', '.join(SENSORS)}; expected a task with these channels, of one number each, and '{name}' is none."
+            )
+
+
+def _names(channels: Iterable[tuple[str, Channel]]) -> set[str]:
+    """Names by which the noise of channels may be given."""
+    return {name for group, c in channels for name in (c.name, f"{group}.{c.name}")}
+
+
+def _noise_of(channels: Iterable[str], noise: bool | Mapping[str, Any]) -> bool | Mapping[str, Any]:
+    """What is given of the noise of some channels, "group.channel"."""
+    if not isinstance(noise, Mapping):
+        return noise
+    names = {name for channel in channels for name in (channel, channel.partition(".")[2])}
+    return {name: value for name, value in noise.items() if name in names}
 
 
 def _imperfection(channel: str, given: Any) -> Imperfection:

@@ -12,6 +12,7 @@ from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.patient.patient import fields_of
 from exo_env.tables import STATUS
 from exo_env.tasks.movements.movement import Movement
+from exo_env.tasks.observation.channels import Reading
 from exo_env.tasks.task import NOTHING, SOLVER
 from exo_env.world.episodes.episode import Episode
 from exo_env.world.world import PatientWorld
@@ -40,13 +41,18 @@ class Readout:
         """A component of the model's sensors, by its name."""
         return float(self.world.tables.dynamics.y[self.world.names[name]])
 
+    def known_readings(self) -> list[Reading]:
+        """Readings of the task; those that the device's filter estimates only where it runs."""
+        runs = self.world.observer.device is not None
+        return [r for r in self.world.task.readings if runs or r.estimate is None]
+
     @property
     def activations(self) -> np.ndarray:
         """Activations of the muscles [-], shape (m,)."""
         return np.array([self.sensor(muscle_sensor(m, "activation")) for m in self.episode.arm.muscles])
 
     def readings(self) -> dict[str, float]:
-        """Every sensor of the model, the readings of the task, the commands reached, and the solver's counts.
+        """Every sensor of the model, the known readings of the task, the commands reached, and the solver's counts.
 
         Readings of several components have the component's label behind a dot; those that copy a sensor are left to
         the sensor's name. `tracking_error` and `elbow_reaction` are the readings `error` and `reaction`.
@@ -54,7 +60,7 @@ class Readout:
         world, tables = self.world, self.world.tables
         found = {name: float(tables.dynamics.y[k]) for name, k in world.names.items()}
         found["time"] = self.episode.world.time
-        for reading in world.task.readings:
+        for reading in self.known_readings():
             if not reading.sensors:
                 names = [f"{reading.name}.{label}" if label else reading.name for label in reading.labels]
                 found |= dict(zip(names, self(reading.name).tolist(), strict=True))

@@ -38,9 +38,9 @@ from exo_env.tables import (
     TASK,
     WORLD,
 )
-from exo_env.tasks.observation.noise import imperfect
 from exo_env.tasks.task import SOLVER
 from exo_env.world.kernels.load_step import put_load
+from exo_env.world.kernels.observe import observe
 
 SAME_TIME = 1e-6
 """Time by which two events may lie apart and still be one [s]: too short for a step of the solver."""
@@ -168,17 +168,6 @@ def read(w):
     for i in range(source.shape[0]):
         r[target[i]] = y[source[i]]
     call_with_table(ints(task, TASK.read)[0], w)
-
-
-@compiled
-def observe(w, first):
-    """Fill the observation of the present readings; with `first`, they are taken to have been true for long."""
-    o = inner(w, WORLD.observer)
-    imperfect(
-        floats(inner(w, WORLD.task), TASK.readings), ints(o, OBSERVER.columns), matrix(o, OBSERVER.imperfections),
-        matrix(o, OBSERVER.memory), matrix(o, OBSERVER.noise)[ints(w, WORLD.status)[STATUS.step]], first,
-        floats(o, OBSERVER.observation),
-    )  # fmt: skip
 
 
 @compiled

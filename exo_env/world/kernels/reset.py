@@ -52,6 +52,7 @@ from exo_env.tables import (
     DRAW,
     DRIVE,
     DYNAMICS,
+    ESTIMATOR,
     GIVEN,
     OBSERVER,
     OUTCOME,
@@ -117,8 +118,15 @@ def pulleys_out_of_reach(w, arm, load):
 
 @compiled
 def draw_noise(w):
-    """Draw the wandering of the tremor's phase, and the noise of every component that has any."""
-    o, key = inner(w, WORLD.observer), np.uint64(ints(inner(w, WORLD.draw), DRAW.key)[0])
+    """Draw the wandering of the tremor's phase, and the noise of what is observed and of what the device measures."""
+    key = np.uint64(ints(inner(w, WORLD.draw), DRAW.key)[0])
+    draw_noise_of(key, inner(w, WORLD.observer))
+    draw_noise_of(key, inner(inner(w, WORLD.estimator), ESTIMATOR.sensors))
+
+
+@compiled
+def draw_noise_of(key, o):
+    """Draw the noise of every component of an observer that has any, and of the tremor where the observer keeps it."""
     imperfections, noise, names = (
         matrix(o, OBSERVER.imperfections),
         matrix(o, OBSERVER.noise),

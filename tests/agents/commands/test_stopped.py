@@ -16,6 +16,7 @@ from agents.__main__ import main
 from agents.commands.pictures.report_input import collected
 from agents.evaluation.search.tries import Try
 from agents.evaluation.sharing.shares import processes
+from dms_core.errors import SimulationError
 from dms_core.files import output_place
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -138,6 +139,11 @@ def test_processes_of_a_pool_end_without_a_word(capfd):
         next(tried)
     assert capfd.readouterr().err == ""
     assert time.perf_counter() - begin < 20.0  # not the 60 s of a job
+
+
+def test_a_process_that_is_killed_is_a_sentence():
+    with pytest.raises(SimulationError, match="a worker process was killed .* goes on"), processes(1) as share_out:
+        list(share_out(os._exit, [(9,)]))
 
 
 SCRIPT = """

@@ -19,7 +19,7 @@ from agents.evaluation.studies.adaptation import (
     window_returns,
     windows_of,
 )
-from agents.policies.baselines import policy
+from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.policy import Policy
 from dms_core.errors import InputError
 
@@ -137,7 +137,8 @@ def test_the_command(short, tmp_path, capsys):
     assert fair and all(float(r["regret"]) >= 0.0 and float(r["regret_low"]) >= 0.0 for r in fair)
     # The set has one member more than nobody, so that nobody's regret is above 0 somewhere.
     assert any(float(r["regret"]) > 0.0 for r in rows if r["policy"] == "none")
-    assert "10 sets of numbers" in (out / "adaptation.md").read_text()
+    blind = sum(not kind.informed for kind in REFERENCE_FREE.values())
+    assert f"{blind} sets of numbers" in (out / "adaptation.md").read_text()
     assert "windows to nine tenths" in capsys.readouterr().out and not (tmp_path / "run.partial.jsonl").exists()
 
 

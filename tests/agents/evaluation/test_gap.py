@@ -104,7 +104,9 @@ class Told(Nosy):
 
 def test_the_opponent_has_the_same_sensors_and_the_best_training_return():
     returns = training_returns()
-    device = [n for n, k in REFERENCE_FREE.items() if not k.informed and sensors(k.observation) == {"device"}]
+    device = [
+        n for n, k in REFERENCE_FREE.items() if not k.informed and sensors(k.observation) <= {"device", "estimated"}
+    ]
     with_emg = [*device, "emg_proportional"]
     for who, among in (("gravity", device), ("oracle", device), ("emg_proportional", with_emg)):
         assert opponent_of(policy(who)) == max(among, key=returns.__getitem__)

@@ -30,7 +30,9 @@ class Listener(Policy):
 
 
 @pytest.mark.parametrize("name", SHIFTS)
-@pytest.mark.parametrize("who", [policy("gravity"), policy("oracle"), Listener()], ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "who", [policy("gravity"), policy("oracle"), policy("intent_pd"), Listener()], ids=lambda one: one.name
+)
 def test_every_size_is_a_possible_plan_and_the_first_is_none(name, who):
     shift = SHIFTS[name]
     assert list(shift.sizes) == sorted(set(shift.sizes)) and "[" in shift.label
@@ -59,6 +61,20 @@ def test_noise_and_delay_reach_the_sensors_that_are_seen_and_nothing_else():
     assert not any(name.startswith("privileged") for name in oracle), "what no sensor measures has no fault"
 
 
+class Believer(Listener):
+    """Sees nothing but what the device's filter estimates."""
+
+    name, observation = "believer", ("estimated.load",)
+
+
+def test_noise_reaches_the_sensors_of_a_filter_and_not_its_estimates():
+    changes = {name: SHIFTS[f"sensor_{name}"].plan(PLAN, Believer(), size).settings["noise"]
+               for name, size in (("noise", 4.0), ("delay", 80.0), ("bias", 0.05))}  # fmt: skip
+    for found in changes.values():
+        assert {*found} == {"device.angle", "device.rate", "device.guide_force"}
+        check_settings(HIDDEN, {"observation": ["estimated.load"], "noise": found})
+
+
 def test_electrodes_are_worse_for_those_who_have_some():
     shift = SHIFTS["electrode_faults"]
     assert shift.plan(PLAN, policy("gravity"), 2.0) is PLAN
@@ -78,6 +94,7 @@ def test_the_hinge_is_where_the_label_says():
     assert sum(x**2 for x in offset) ** 0.5 == pytest.approx(0.03)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_row_a_size_and_policy(tmp_path, capsys):
     out = tmp_path / "run"
     command = ["shift", "--policy", "gravity", "--shifts", "sensor_delay", "load", "--patients", "2", "--out", str(out)]

@@ -8,6 +8,7 @@ from agents.evaluation.comparison.evaluate import evaluate
 from agents.policies.assist_as_needed import AssistAsNeeded, gaussians
 from agents.policies.baselines import FOLLOWING, policy
 from agents.policies.compensation import ANGLES, CompensatedPid, holding_tensions
+from agents.policies.estimated_load import EstimatedLoadPid
 from agents.policies.lagging_pid import LaggingPid
 from dms_core.errors import InputError
 from exo_env.ecosystem.arm import Person
@@ -73,6 +74,18 @@ def test_compensation_stands_for_the_holding_tension():
         assert given == pytest.approx(expected, abs=0.15)
         total += change * env.unwrapped.period
         observation, _, _, _, info = env.step(action)
+
+
+def test_the_estimated_load_is_compensated_as_it_is_estimated_now():
+    used = EstimatedLoadPid(share=1.0, authority=1.0, lag_deg=0.0)
+    env, observation, _ = made(used)
+    (part,) = [x for x in env.unwrapped.observation_structure if x.name == "load"]
+    assert part.group == "estimated"
+    for load in (0.5, 1.25, 2.0):
+        observation[part.start] = load / part.scale
+        expected = holding_tensions(env.unwrapped.ecosystem, Person(), load, ANGLES)
+        # Statics are linear in the load; the observation is float32.
+        np.testing.assert_allclose(used.held(observation), expected, rtol=1e-5, atol=1e-4)
 
 
 def test_gaussians_sum_to_one_and_peak_at_the_angle():

@@ -59,6 +59,7 @@ def test_what_is_no_policy_is_named(name, said):
         find_policy(name)
 
 
+@pytest.mark.slow
 def test_a_zip_says_how_it_becomes_a_policy_and_the_command_works(tmp_path, capsys):
     pytest.importorskip("stable_baselines3")
     from stable_baselines3 import PPO

@@ -199,6 +199,7 @@ def test_a_second_process_changes_nothing(run, capsys):
     assert resume(run, "n_timesteps=64") == 0
 
 
+@pytest.mark.slow
 def test_of_two_processes_that_go_on_at_once_one_does(run):
     command = [sys.executable, "-m", "agents", "train", "--resume", str(run), "--set", "n_timesteps=20000"]
     both = [

@@ -127,7 +127,9 @@ def wait_for(condition, running, seconds=300.0):
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac", "dagger"])
+@pytest.mark.parametrize(
+    "algorithm", ["ppo", pytest.param("sac", marks=pytest.mark.slow), pytest.param("dagger", marks=pytest.mark.slow)]
+)
 def test_killed_at_any_moment_it_goes_on(algorithm, tmp_path):
     path, out = config_file(tmp_path, algorithm), tmp_path / "run"
     running = process("--config", path, "--out", out, "--set", "n_timesteps=1e6", "training.eval_every=1e6")
@@ -145,7 +147,7 @@ def test_killed_at_any_moment_it_goes_on(algorithm, tmp_path):
     assert not list((out / "checkpoints").glob(".*"))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_told_to_stop_it_saves_and_says_how_to_go_on(number, tmp_path):
     path, out = config_file(tmp_path), tmp_path / "run"
     running = process(
@@ -162,6 +164,7 @@ def test_told_to_stop_it_saves_and_says_how_to_go_on(number, tmp_path):
     RunFolder(out).checkpoints.latest()
 
 
+@pytest.mark.slow
 def test_full_disk_leaves_the_last_checkpoint(tmp_path):
     resource = pytest.importorskip("resource")
     path, out = config_file(tmp_path, "sac"), tmp_path / "run"

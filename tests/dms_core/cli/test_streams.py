@@ -29,7 +29,10 @@ def shell(line: str, folder: Path, **env: str) -> subprocess.CompletedProcess[st
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&- <&-"])
+@pytest.mark.parametrize(
+    "closed",
+    [pytest.param(">&-", marks=pytest.mark.slow), pytest.param("2>&-", marks=pytest.mark.slow), ">&- 2>&- <&-"],
+)
 def test_closed_streams(tmp_path, closed):
     done = shell(f"PYTHON -m dms_core schema --out page.md {closed}", tmp_path)
     assert done.returncode == 0 and done.stderr == ""
@@ -44,14 +47,14 @@ def test_a_full_standard_output_is_one_sentence(tmp_path):
     assert done.stderr.startswith("error: standard output: No space left on device; ") and done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("encoding", ["ascii:strict", "latin-1"])
+@pytest.mark.parametrize("encoding", ["ascii:strict", pytest.param("latin-1", marks=pytest.mark.slow)])
 def test_signs_that_an_encoding_does_not_have_are_replaced(tmp_path, encoding):
     (tmp_path / "model.yaml").write_text(MODEL, encoding="utf-8")
     done = shell("PYTHON -m dms_core check model.yaml", tmp_path, PYTHONIOENCODING=encoding, LC_ALL="C", PYTHONUTF8="0")
     assert done.returncode == 0 and done.stderr == "" and "?" in done.stdout
 
 
-@pytest.mark.parametrize("columns", ["1", "9"])
+@pytest.mark.parametrize("columns", ["1", pytest.param("9", marks=pytest.mark.slow)])
 def test_help_comes_to_an_end_in_a_narrow_terminal(tmp_path, columns):
     done = shell("timeout 60 PYTHON -m dms_core run --help", tmp_path, COLUMNS=columns)
     assert done.returncode == 0 and "--t-end" in done.stdout

@@ -87,6 +87,7 @@ def test_an_edit_is_seen_wherever_code_is_kept(run):
     assert Path(found["folder"]).is_relative_to(run.folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["NUMBA_CACHE_DIR"], indirect=True)
 def test_an_edit_anywhere_below_a_function_is_seen(run):
     first = run()
@@ -110,6 +111,7 @@ def test_an_edit_anywhere_below_a_function_is_seen(run):
         assert run()["hits"] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["NUMBA_CACHE_DIR"], indirect=True)
 def test_damaged_files_count_as_missing(run):
     run()
@@ -134,6 +136,7 @@ def test_code_of_one_function_is_not_taken_for_another(run):
     assert run()["made"] == [2.0, 3.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["NUMBA_CACHE_DIR"], indirect=True)
 def test_settings_of_numba_are_in_the_key(run):
     run()

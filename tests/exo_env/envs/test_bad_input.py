@@ -65,7 +65,7 @@ def test_step_before_reset_and_after_the_end():
         ({"drive_settings": {"setpoint_range": 0.1}}, "setpoint_range"),
         ({"observation": []}, "observation"),
         ({"observation": ["device", "device"]}, "different groups"),
-        ({"observation": ["eeg"]}, "group 'eeg' is unknown; there are device, emg, privileged"),
+        ({"observation": ["eeg"]}, "group 'eeg' is unknown; there are device, emg, estimated, privileged"),
         ({"noise": {"emg": {"deviation": 0.1}}}, "channel 'emg' is not observed"),
         ({"noise": {"angle": {"deviation": -0.1}}}, "deviation"),
         ({"noise": "some"}, "noise = 'some'"),

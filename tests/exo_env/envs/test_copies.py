@@ -19,7 +19,10 @@ from dms_core.files.config_files import configs
 from exo_env.clearing import Kept, arrays_of
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 
-ALL = {"observation": ["device", "emg", "privileged"], "noise": {"angle": {"deviation": 0.01, "delay": 0.05}}}
+ALL = {
+    "observation": ["device", "estimated", "emg", "privileged"],
+    "noise": {"angle": {"deviation": 0.01, "delay": 0.05}},
+}
 HOLD = np.array([-0.3, -0.5])
 WAYS = {
     "deepcopy": copy.deepcopy,

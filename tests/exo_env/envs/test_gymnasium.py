@@ -62,6 +62,7 @@ def _bits(seed, before=""):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_bits_in_every_process():
     first = _bits(7)
     # What was simulated before must not matter.

@@ -60,7 +60,11 @@ def _together(envs: VectorEnv) -> list[list[tuple]]:
     return found
 
 
-@pytest.mark.parametrize("kind", list(VECTORS))
+KINDS = [pytest.param(k, marks=pytest.mark.slow) if "spawned" in k else k for k in VECTORS]
+"""A process that is spawned imports everything anew."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_vector_gives_what_its_environments_give_alone(kind):
     envs = VECTORS[kind]()
     try:

@@ -1,11 +1,15 @@
-"""The example of docs/elbow-estimation.md runs, and its table is the committed one."""
+"""The example of docs/elbow-estimation.md runs, and its tables are the committed ones."""
 
 from __future__ import annotations
 
 import csv
 import math
+import re
+
+import pytest
 
 from dms_core.files.config_files import configs
+from exo_env.estimation.reduced_filter import ESTIMATE_NAMES
 
 DOCS = configs().parent / "docs"
 
@@ -17,15 +21,27 @@ def test_the_example_prints_a_moment(capsys):
     assert capsys.readouterr().out.startswith("Moment(others=")
 
 
-def test_the_table_is_that_of_the_file():
+def tables() -> list[list[list[str]]]:
+    """Cells of each table of the page, without head and rule."""
     page = (DOCS / "elbow-estimation.md").read_text(encoding="utf-8")
-    shown = [[cell.strip() for cell in line[1:-1].split("|")] for line in page.splitlines() if line[:2] == "| "]
-    with (DOCS / "elbow_estimation.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert len(shown) == len(rows) + 1
-    for cells, row in zip(shown[1:], rows, strict=True):
+    blocks = re.findall(r"(?:^\|.*\n)+", page, re.MULTILINE)
+    return [[[cell.strip() for cell in line[1:-1].split("|")] for line in x.splitlines()[2:]] for x in blocks]
+
+
+@pytest.mark.parametrize(("table", "file", "ending"), [(0, "elbow_estimation", "_Nm"), (2, "elbow_estimated", "")])
+def test_the_table_is_that_of_the_file(table, file, ending):
+    shown = tables()[table]
+    with (DOCS / f"{file}.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(shown) == len(rows)
+    for cells, row in zip(shown, rows, strict=True):
         assert float(cells[2].rstrip(" %")) == round(100.0 * float(row["error_over_rms"]), 1)
         assert float(cells[3].rstrip(" %")) == round(100.0 * float(row["median_of_patients"]), 1)
-        assert cells[4] == f"{float(row['error_Nm']):.2f} of {float(row['rms_Nm']):.2f} Nm"
+        error, rms = (float(row[name + ending]) for name in ("error", "rms"))
+        assert cells[4].rpartition(" ")[0] == f"{error:.2f} of {rms:.2f}"
         covered = float(row["coverage_95"])
         assert cells[5] == ("" if math.isnan(covered) else f"{100.0 * covered:.1f} %")
+
+
+def test_the_channels_of_the_page_are_those_of_the_group():
+    assert [cells[0].split("`")[1] for cells in tables()[1]] == list(ESTIMATE_NAMES)

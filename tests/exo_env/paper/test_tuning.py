@@ -26,6 +26,7 @@ def experiment(device) -> StepExperiment:
     return StepExperiment(device)
 
 
+@pytest.mark.slow
 def test_the_command_finds_the_shipped_gains(device, tmp_path, capsys):
     assert main(["tune", "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "tuning.json").read_text())

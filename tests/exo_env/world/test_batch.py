@@ -14,7 +14,7 @@ from exo_env.world import batch as batch_module
 from exo_env.world.batch import Batch
 
 ENV = "exo_env:exo/ElbowLift-v2"
-SHORT = {"episode_duration": 0.5, "observation": ["device", "emg", "privileged"]}
+SHORT = {"episode_duration": 0.5, "observation": ["device", "estimated", "emg", "privileged"]}
 
 
 def _same(a, b, where=""):

@@ -13,7 +13,9 @@ from agents.policies.baselines import REFERENCE_FREE, policy
 from agents.policies.reference_free.assist_moment import Seen
 from agents.policies.reference_free.emg_proportional import EmgProportional
 from agents.policies.reference_free.gravity import Gravity, GravityLoad
+from agents.policies.reference_free.intent_pd import IntentPd
 from agents.policies.reference_free.known import ANGLES, Known, at
+from agents.policies.reference_free.lack_assist import LackAssist
 from agents.policies.reference_free.mean_movement import MeanAngle, MeanClock
 from agents.policies.reference_free.onset import Onset
 from agents.policies.reference_free.oracle import Oracle
@@ -177,6 +179,62 @@ def test_an_onset_is_completed_and_then_let_go():
     # The arm is held, so the whole amplitude is missing at the end of the movement: 10 Nm/rad times 40 deg.
     assert max(moments) == pytest.approx(10.0 * np.radians(40.0), rel=0.02)
     assert not any(moments[-9:])
+
+
+def told(used, observations, **estimates):
+    """Observations in which the device's filter says something."""
+    changed = observations.copy()
+    for part in used.channels._slices.values():
+        if part.group == "estimated":
+            changed[:, part.start] = estimates.get(part.name, 0.0) / part.scale
+    return changed
+
+
+def test_the_estimated_lack_is_given():
+    used = middle(LackAssist, gain=1.0, filtering=0.02, share=0.0, boost=0.5, stiffness=2.0, damping=0.0)
+    _, observations = begun(used)
+    used.act(observations)
+    seen = Seen(np.radians([60.0]), np.zeros(1), np.zeros(1))
+    # At rest the patient leaves 3 Nm to the device, which gives them and holds its own link.
+    at_rest = told(used, observations, others_moment=-3.0)
+    for _ in range(50):
+        moment = used.wanted(at_rest, seen)
+    assert moment == pytest.approx(3.0 + used.link(seen.angle), rel=1e-5)
+    # A moment that is to move the arm is no lack less, and is helped by half.
+    moved = used.wanted(told(used, observations, others_moment=-2.0, intended_moment=1.0), seen)
+    assert moved == pytest.approx(moment + 0.5, rel=1e-5)
+    higher = Seen(np.radians([90.0]), np.zeros(1), np.zeros(1))
+    pulled = used.wanted(at_rest, higher) - used.link(higher.angle) - used._lack
+    assert pulled == pytest.approx(-2.0 * np.radians(30.0), rel=1e-5)
+    # Who is believed to lack nothing gets a share of an average arm, by (1 - gain).
+    shy = middle(LackAssist, gain=0.0, filtering=0.02, share=1.0, boost=0.0, stiffness=2.0, damping=0.0)
+    _, observations = begun(shy)
+    shy.act(observations)
+    assert shy.wanted(told(shy, observations, others_moment=-3.0), seen) == pytest.approx(
+        at(shy.known.own, seen.angle), rel=1e-5
+    )
+
+
+def test_the_estimated_intention_moves_the_virtual_joint():
+    used = middle(IntentPd, mass=0.05, drag=1.0, dead=0.2, stiffness=10.0, damping=0.05, share=0.0, carried=0.0)
+    _, observations = begun(used)
+    used.act(observations)
+    seen = Seen(np.radians([60.0]), np.zeros(1), np.zeros(1))
+    used.start(observations, seen)
+    for _ in range(20):
+        still = used.wanted(told(used, observations, intended_moment=0.1), seen)
+    assert still == 0.0
+    for _ in range(10):
+        up = used.wanted(told(used, observations, intended_moment=1.2), seen)
+    # 1 Nm beyond the dead zone moves 1 N m s/rad by nearly 0.2 rad in 0.2 s: less what the mass takes to start.
+    assert 0.1 < (up / 10.0).item() < 0.2
+    down = middle(IntentPd, mass=0.05, drag=1.0, dead=0.2, stiffness=10.0, damping=0.05, share=0.0, carried=0.0)
+    _, observations = begun(down)
+    down.act(observations)
+    down.start(observations, seen)
+    for _ in range(10):
+        moment = down.wanted(told(down, observations, intended_moment=-1.2), seen)
+    assert moment == pytest.approx(-up)
 
 
 def test_the_mean_movement_is_that_of_many_episodes_and_of_no_single_one():

@@ -1,0 +1,1 @@
+"""Design by gradient: attachment points, guide and cuff of a device that lower a load over patients who wear it."""

@@ -1,0 +1,43 @@
+"""The smoothed objectives: their equation, their derivative, and how near they are to a peak."""
+
+import numpy as np
+import pytest
+
+from dms_core.errors import InputError
+from exo_env.design.objectives import OBJECTIVES, objective
+
+ROPES = ("agonist", "antagonist")
+
+
+@pytest.mark.parametrize("name", OBJECTIVES)
+def test_the_derivative_by_readings(name):
+    lowered = OBJECTIVES[name]
+    readings = np.random.default_rng(0).uniform(1.0, 2.0, len(lowered.outputs(ROPES, [0.1, 0.2, 0.3])))
+    slope = lowered.of(ROPES, readings)[1]
+    moves = 1e-5 * np.eye(len(readings))
+    expected = [(lowered.of(ROPES, readings + m)[0] - lowered.of(ROPES, readings - m)[0]) / 2e-5 for m in moves]
+    # Central differences of functions of order 1 with p = 20: the third derivative is below p^2.
+    assert slope == pytest.approx(np.array(expected), abs=1e-7)
+
+
+def test_a_peak_is_approached_from_below_and_power_is_the_root_of_the_mean_square():
+    tension = 100.0 * np.exp(-(np.linspace(-2.0, 2.0, 40) ** 2))
+    readings = np.column_stack([tension, 0.1 * tension]).ravel()
+    found = objective("peak_tension").of(ROPES, readings)[0]
+    assert found == pytest.approx(((tension**20).sum() * (1.0 + 0.1**20) / 40.0) ** 0.05)
+    assert 0.85 * tension.max() < found < tension.max()
+    power = objective("motor_power").of(("agonist",), np.array([2.0, -3.0, 4.0, 0.5]))[0]
+    assert power == pytest.approx(np.sqrt((6.0**2 + 2.0**2) / 2.0))
+    reaction = objective("elbow_reaction").of(ROPES, np.tile([3.0, 0.0, 4.0], 5))[0]
+    assert reaction == pytest.approx(5.0)
+
+
+def test_large_forces_do_not_overflow_and_none_are_no_error():
+    assert objective("peak_tension").of(("agonist",), np.full(3, 1e30))[0] == pytest.approx(1e30)
+    value, slope = objective("elbow_reaction").of(ROPES, np.zeros(6))
+    assert value == 0.0 and not slope.any()
+
+
+def test_an_unknown_objective():
+    with pytest.raises(InputError, match="objective = 'comfort': expected one of .*elbow_reaction"):
+        objective("comfort")

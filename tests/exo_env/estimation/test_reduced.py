@@ -1,0 +1,192 @@
+"""The reduced filter of the elbow against the nominal equations, against the full filter, and against the truth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from dms_core import Model, SolverOptions, World
+from exo_env.ecosystem.person import HEIGHT_0, MASS_0
+from exo_env.envs.hidden_intent import HiddenIntentEnv
+from exo_env.estimation import ElbowEstimator, NominalElbow
+from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, RATE
+from exo_env.estimation.nominal_elbow import GRIP, NET
+from exo_env.estimation.reduced_elbow import ReducedTuning, reduced_elbow
+from exo_env.estimation.reduced_filter import (
+    BELIEF,
+    ESTIMATE,
+    FAST,
+    LEARNT,
+    NUMBERS,
+    SLOW,
+    begin_estimates,
+    step_estimates,
+)
+
+NOISE = (math.hypot(2e-4, 1.5e-3 / math.sqrt(12.0)), 0.02, 0.5)
+"""That of the full filter: angle [rad], rate [rad/s], cuff [N]."""
+
+
+class Filter:
+    """The compiled filter alone."""
+
+    def __init__(self, period, noise=NOISE, tuning=None):
+        self.elbow = reduced_elbow(HiddenIntentEnv().ecosystem, period, noise, tuning=tuning)
+        self.mean, self.fast, self.slow = np.zeros(len(BELIEF)), np.zeros((FAST, FAST)), np.zeros((SLOW, SLOW))
+        self.learnt, self.out = np.zeros(len(LEARNT)), np.zeros(len(ESTIMATE))
+
+    def take(self, readings, first=False):
+        """Estimates behind readings of angle, rate and force."""
+        kernel = begin_estimates if first else step_estimates
+        kernel(
+            np.array(readings, float), *self.elbow, self.mean, self.fast, self.slow, self.learnt, self.out
+        )  # fmt: skip
+        return self.out.copy()
+
+    def run(self, rows):
+        """Estimates over a record, shape (n, 10)."""
+        return np.array([self.take(row, k == 0) for k, row in enumerate(rows)])
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    """The nominal elbow as equations."""
+    return World(Model(NominalElbow().system()), SolverOptions(rtol=1e-7))
+
+
+@pytest.mark.parametrize("net, grip", [(1.0, 0.0), (0.0, 1.0), (-0.7, 2.0)])
+def test_the_nominal_equations_have_these_inertias_and_this_lever(world, net, grip):
+    n = dict(zip(NUMBERS._fields, Filter(0.02).elbow.numbers.tolist(), strict=True))
+    names = [name for name, _ in world.model.layout.outputs]
+    world.set_input(NET, net)
+    world.set_input(GRIP, grip)
+    world.settle()
+    seen = dict(zip(names, world.read(), strict=True))
+    # The same equations, solved with a sparse factorisation: rounding only.
+    assert seen["exo_angle.acceleration"] == pytest.approx(net * n["by_inertia"], rel=1e-9, abs=1e-12)
+    assert n["lever"] * seen[GUIDE_FORCE] == pytest.approx(grip - n["link_share"] * net, rel=1e-9, abs=1e-12)
+    # others = I_f theta'' - F d = net - grip
+    arm = n["arm_share"] / n["by_inertia"] * seen["exo_angle.acceleration"] - n["lever"] * seen[GUIDE_FORCE]
+    assert arm == pytest.approx(net - grip, rel=1e-9)
+
+
+def test_the_exact_solution_over_a_period():
+    """Many short periods are one long one."""
+    short, long = (reduced_elbow(HiddenIntentEnv().ecosystem, T, NOISE) for T in (0.002, 0.02))
+    x, P = np.array([0.0, 0.0, 1.0]), np.zeros((3, 3))
+    n = NUMBERS
+    A = np.array(
+        [[1.0, 0.002, short.numbers[n.angle_by_net]], [0.0, 1.0, short.numbers[n.rate_by_net]],
+         [0.0, 0.0, short.numbers[n.net_keep]]]
+    )  # fmt: skip
+    for _ in range(10):
+        x, P = A @ x, A @ P @ A.T + short.disturbance
+    assert x == pytest.approx(long.numbers[[n.angle_by_net, n.rate_by_net, n.net_keep]], rel=1e-10)
+    np.testing.assert_allclose(P, long.disturbance, rtol=1e-8)
+
+
+def record(world, period, steps, rng):
+    """Noisy readings of the nominal elbow under a push and a rest that move, and the moment of others, true."""
+    names = [name for name, _ in world.model.layout.outputs]
+    rows, moments = [], []
+    for k in range(steps):
+        push, rest = 2.0 * np.sin(0.8 * period * k), 0.2 * np.sin(9.0 * period * k)
+        world.set_input(GRIP, -push)
+        world.set_input(NET, rest)
+        world.advance(period * (k + 1))
+        seen = dict(zip(names, world.read(), strict=True))
+        rows.append([seen[x] + s * rng.normal() for x, s in zip((ANGLE, RATE, GUIDE_FORCE), NOISE, strict=True)])
+        moments.append(rest + push)
+    return np.array(rows), np.array(moments)
+
+
+@pytest.mark.parametrize("period", [0.002, 0.02])
+def test_full_and_reduced_filter_agree(period):
+    world = World(Model(NominalElbow().system()), SolverOptions(rtol=1e-7))
+    world.settle()
+    rows, moments = record(world, period, 250, np.random.default_rng(2))
+    full = ElbowEstimator(NominalElbow(inertia_doubt=0.0), period)
+    reduced = Filter(period, tuning=ReducedTuning(net_time=0.05, least=0.05, inertia_doubt=0.0)).run(rows)
+    others = []
+    for k, row in enumerate(rows):
+        readings = dict(zip((ANGLE, RATE, GUIDE_FORCE), row.tolist(), strict=True))
+        found = full.reset(readings) if k == 0 else full.update(readings)
+        others.append((found.others, found.deviation))
+    late, (a, s), b = round(0.3 * len(rows)), np.array(others).T, reduced[:, ESTIMATE.others_moment]
+    apart = np.sqrt(np.mean(np.square(a - b)[late:]))
+    # One implicit step of the full filter errs by period / net_time in what net does within a period.
+    assert apart < (0.1 if period < 0.01 else 0.5) * np.mean(s[late:])
+    assert np.sqrt(np.mean(np.square(b - moments)[late:])) < 1.2 * np.sqrt(np.mean(np.square(a - moments)[late:]))
+    assert reduced[-1, ESTIMATE.others_moment_deviation] == pytest.approx(s[-1], rel=0.1 if period < 0.01 else 0.3)
+
+
+def test_an_average_patient_with_a_known_load_is_known():
+    """The truth's own body, load told, little noise: what is left is what the filter cannot follow."""
+    average = {"body_mass": MASS_0, "height": HEIGHT_0, "sex": "male"}
+    env = HiddenIntentEnv(
+        observation=["device", "estimated"], load=1.0, reference={"load_changes": 0.0}, noise=False, patient=average
+    )
+    env.reset(seed=4)
+    rows, truth = [], []
+    for _ in range(300):
+        env.step(np.array([0.1, -1.0]))
+        rows.append(env.world.tables.estimator.sensed.copy())
+        truth.append(env.readout.number("muscle_moment"))
+    told = ReducedTuning(load=1.0, load_deviation=1e-3, inertia_doubt=0.0, weight_doubt=0.0)
+    found = Filter(0.02, (1e-5, 1e-3, 0.05), told).run(rows)[50:, ESTIMATE.muscle_moment]
+    error = np.sqrt(np.mean(np.square(found - np.array(truth)[50:])))
+    # The handle swings on its own, and the rate at which the load is lifted has a moment that is left out.
+    assert error < 0.03 * np.sqrt(np.mean(np.square(truth)))
+
+
+def test_the_load_cannot_be_told_and_the_deviations_say_so():
+    """A device that holds more and more: the load's deviation stays near its prior's, and the muscles' has it."""
+    one = Filter(0.02)
+    one.take((1.0, 0.0, 20.0), first=True)
+    for k in range(500):
+        found = one.take((1.0, 0.0, 20.0 + 0.02 * k))
+    prior, kilogram = ReducedTuning().load_deviation, one.elbow.curves[29, 1]
+    assert 0.95 * prior < found[ESTIMATE.load_deviation] <= prior
+    assert found[ESTIMATE.muscle_moment_deviation] > 0.9 * kilogram * prior
+    assert found[ESTIMATE.others_moment_deviation] < 0.2 * found[ESTIMATE.muscle_moment_deviation]
+
+
+def test_what_is_intended_is_what_is_new():
+    """Nothing at rest, whoever carries; a moment that comes within a moment; which is then a habit."""
+    one, push = Filter(0.02), 12.0
+    one.take((1.0, 0.0, 20.0), first=True)
+    for _ in range(200):
+        rest = one.take((1.0, 0.0, 20.0))
+    assert abs(rest[ESTIMATE.intended_moment]) < 0.15
+    for _ in range(10):
+        begun = one.take((1.0, 0.0, 20.0 - push))
+    assert begun[ESTIMATE.intended_moment] > 0.35 * 0.16 * push
+    for _ in range(2000):
+        late = one.take((1.0, 0.0, 20.0 - push))
+    assert abs(late[ESTIMATE.intended_moment]) < 0.3 * begun[ESTIMATE.intended_moment]
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf, -1e300])
+@pytest.mark.parametrize("what", ["mean", "fast", "slow", "learnt"])
+def test_a_filter_that_is_lost_begins_anew(what, broken):
+    one = Filter(0.02)
+    one.take((0.8, 0.0, 3.0), first=True)
+    getattr(one, what).flat[0] = broken
+    found = one.take((0.8, 0.0, 3.0))
+    assert np.isfinite(found).all() and np.isfinite(one.fast).all() and np.isfinite(one.slow).all()
+    again = one.take((0.8, 0.0, 3.0))
+    assert abs(again[ESTIMATE.others_moment] + 0.16 * 3.0) < 0.1
+
+
+@pytest.mark.parametrize("reading", [1e6, -1e6])
+def test_readings_beyond_all_reason_leave_numbers_finite(reading):
+    one = Filter(0.02)
+    one.take((reading, reading, reading), first=True)
+    for k in range(50):
+        found = one.take((reading, -reading, reading * (-1) ** k))
+        assert np.isfinite(found).all()
+    for _ in range(200):
+        found = one.take((0.8, 0.0, 3.0))
+    assert abs(found[ESTIMATE.others_moment] + 0.16 * 3.0) < 0.1
