@@ -43,14 +43,21 @@ RAMP = places(("input", "begin", "length"))
 
 
 @compiled
+def act(w, part):
+    """Let the drive or the patient act."""
+    if part == PARTS.drive:
+        set_commands(w)
+    else:
+        set_excitations(w)
+
+
+@compiled
 def do_part(w, part):
     """Do one part of a control period."""
     if part == PARTS.load:
         put_load(w)
-    elif part == PARTS.drive:
-        set_commands(w)
-    elif part == PARTS.patient:
-        set_excitations(w)
+    elif part == PARTS.drive or part == PARTS.patient:
+        act(w, part)
     elif part == PARTS.sense:
         sense(w)
     else:
@@ -100,7 +107,7 @@ def difference_part(w, part, memory, read, written, kept, slope):
         h = DIFFERENCE * max(abs(x[read[j, 1]]), 1.0)
         for sign in (1.0, -1.0):
             x[read[j, 1]] += sign * h
-            do_part(w, part)
+            act(w, part)
             for i in range(written.shape[0]):
                 after = floats(memory, written[i, 0])[written[i, 1]]
                 slope[i, j] = after if sign > 0.0 else (slope[i, j] - after) / (2.0 * h)

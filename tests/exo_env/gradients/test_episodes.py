@@ -151,6 +151,24 @@ def test_a_period_is_the_same_from_the_same_state():
     np.testing.assert_array_equal(period(start, action)[1], seen)
 
 
+def test_environment_goes_on_as_if_it_had_been_stepped():
+    """Behind any number of calls: observation, what the device's filter estimates among it, and reward."""
+    settings = {"action_mode": "assist_moment", "observation": ["device", "estimated"]}
+    env = made(HIDDEN, solver={}, **settings)
+    period, actions = ControlPeriod(env, SEEN), some_actions(env, 6)
+    start = period.start()
+    for _ in range(2):
+        state = start
+        for action in torch.tensor(actions[:5], requires_grad=True):
+            state, _ = period(state, action)
+    found = env.step(actions[5])
+    env.reset(seed=1)
+    for action in actions:
+        expected = env.step(action)
+    np.testing.assert_array_equal(found[0], expected[0])
+    assert found[1] == expected[1]
+
+
 def test_gradient_by_the_state_is_that_of_differences():
     """Amid an episode, by what no constraint ties: first-order states, commands, excitations and the patient's memory.
 
