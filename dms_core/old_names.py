@@ -1,6 +1,7 @@
 """Modules by the names that they had in earlier versions, and where they are now."""
 
 MOVED = {
+    "analyses.driven_inputs": "analyses.driven_states",
     "assembly.arena": "compiled.arena",
     "assembly.blocks": "assembly.derivatives.blocks",
     "assembly.calls": "compiled.calls",

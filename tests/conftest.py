@@ -1,7 +1,8 @@
-"""The built wheel in an environment of its own, for the tests of what is shipped."""
+"""Ctrl-C as in a terminal, and the built wheel in an environment of its own, for the tests of what is shipped."""
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import venv
@@ -12,6 +13,11 @@ import pytest
 from dms_core.files.config_files import configs
 
 ROOT = configs().parent
+
+
+def pytest_configure() -> None:
+    """A shell's background job ignores Ctrl-C, and so would every process that the tests send it to."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,8 @@ At each time Newton's method closes the constraints from the position predicted 
 errs too much the interval is halved. Where phi_q loses rank the position is singular: the motion goes on along its
 branch and the place is reported, or ends there, where velocities grow without bound (a rocker at the end of its swing).
 
-States of elements (fibres, activations, controllers) do not follow from positions; they stay at their start.
+Turn counters go along with the joints that they count (driven_states.py). Other states of elements (fibres,
+activations, controllers) do not follow from positions; they stay at their start.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dms_core.analyses.driven_inputs import check_drives_nothing
+from dms_core.analyses.driven_states import TurnCounts, check_drives_nothing
 from dms_core.analyses.motion_names import motion_in_words
 from dms_core.assembly.derivatives.blocks import OperatingPoint
 from dms_core.assembly.model import Model
@@ -106,10 +107,11 @@ class Driven:
     """
 
     def __init__(self, model: Model) -> None:
-        check_drives_nothing(model, "states of elements do not follow from positions")
+        check_drives_nothing(model)
         self.model = model
         self.moving = np.arange(model.layout.of_bodies)
         self.scale = model.tables.values.scale_q
+        self.turns = TurnCounts(model)
         self._signals, self._work = Packed(model.new_signals()), Packed(model.new_work())
         _check_drivers(model, self.moving)
 
@@ -125,6 +127,7 @@ class Driven:
             phi, _, G, _ = self.model.constraint_jacobian(q, None, t, t > 0.0)
             size = float(np.abs(phi).max(initial=0.0))
             if size < CLOSED or (size < ROUNDED and size >= before):
+                self.turns.put_angles(q)
                 return q, k
             if not size < 1e3:
                 return None
@@ -139,6 +142,7 @@ class Driven:
         _, phi_t, G, _ = model.constraint_jacobian(q, zero, t, t > 0.0)
         G = G[:, self.moving]
         v[self.moving] = np.linalg.lstsq(G, -phi_t, rcond=1e-12)[0]
+        self.turns.put_rates(q, v)
         u = self.inputs(t)
         point = OperatingPoint(q, v, v, zero, np.zeros(model.n_phi), np.zeros(model.n_phi), u)
         b = model.derivatives.blocks(point)
@@ -256,7 +260,8 @@ class _Walk:
             return None
         q, iterations = done
         self.iterations += iterations
-        return q if np.max(np.abs(q - guess) / self._driven.scale) <= FARTHEST else None
+        moved = np.abs(q - guess)[self._driven.moving] / self._driven.scale[self._driven.moving]
+        return q if np.max(moved, initial=0.0) <= FARTHEST else None
 
     def _independent(self) -> np.ndarray:
         """Rows that determine the position here."""

@@ -20,7 +20,7 @@ B_acceleration, and so does D. Constraints' inputs are taken as additive and lin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -120,6 +120,22 @@ class Linearisation:
         """True where no small disturbance grows."""
         largest = float(np.max(np.abs(self.eigenvalues), initial=0.0))
         return self.growth <= GROWS * largest
+
+    def without(self, coordinates: Sequence[int]) -> Linearisation:
+        """The same system without states of first order that nothing depends on, or that never change.
+
+        Args:
+            coordinates: their numbers among the model's.
+        """
+        gone = {f"q.{self.model.layout.names[k]}" for k in coordinates}
+        if not gone:
+            return self
+        kept = np.array([name not in gone for name in self.states])
+        rows = {name: getattr(self, name)[kept] for name in ("B", "B_rate", "B_acceleration")}
+        return replace(
+            self, A=self.A[np.ix_(kept, kept)], C=self.C[:, kept], to_q=self.to_q[:, kept],
+            states=tuple(name for name in self.states if name not in gone), **rows,
+        )  # fmt: skip
 
     def modes(self) -> tuple[Mode, ...]:
         """Modes by rising frequency; of a conjugate pair the one with a positive imaginary part."""

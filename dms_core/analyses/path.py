@@ -218,7 +218,6 @@ def follow_path(
 
     Raises:
         InputError: no load is named, one does not exist, or a number is out of range.
-        ModelError: an element reads a sensor or drives an input.
         SimulationError: there is no equilibrium to begin with.
 
     Example:
@@ -233,7 +232,7 @@ def follow_path(
         raise InputError(f"longest: Expected a positive arc length, got {longest}.")
     compiled = model if isinstance(model, Model) else Model(model)
     equations = RestEquations(compiled, loads, time, inputs)
-    q, _, iterations = relaxed(equations, compiled.start.q if start is None else np.asarray(start, float), load)
+    q, _, iterations = relaxed(equations, equations.unknowns(compiled.start.q if start is None else start), load)
     follower, upwards = _Follower(equations), np.sign(to - load)
     here = follower.place(q, load, None)
     if here.ts * upwards < 0.0:

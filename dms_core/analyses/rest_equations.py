@@ -10,6 +10,11 @@ A controller that integrates its error e has the row vdot_c = edot, which does n
 e = 0 is solved instead, e being the rate that the element's own `start_states` gives; its derivative is a central
 difference. Where the integral moves nothing (a controller without integral gain or without authority), it is held, and
 its rate is e.
+
+Readings of sensors and driven inputs are rates of own coordinates too (dms_core.assembly.pattern.connections), whose
+positions nothing reads. There the rate, the signal itself, is the unknown, in the position's place: with such signals
+among them, "q" is a vector of unknowns here, and `point` gives the state that it stands for. A state whose row says no
+more than v = 0, as the integral of a sensor_pid without integral gain, is held.
 """
 
 from __future__ import annotations
@@ -20,7 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dms_core.analyses.driven_inputs import check_drives_nothing, check_reads_nothing
 from dms_core.assembly.derivatives.blocks import Blocks, OperatingPoint
 from dms_core.assembly.derivatives.input_derivatives import STEP
 from dms_core.assembly.layout import Call
@@ -99,8 +103,8 @@ class RestEquations:
         inputs: values in place of the declared ones, by name.
 
     Raises:
-        InputError: a load is neither an input nor a force without coordinates, or a value is not finite.
-        ModelError: an element reads a sensor or drives an input.
+        InputError: a load is neither an input nor a force without coordinates, a value is not finite, or an input that
+            is named is driven by an element.
     """
 
     def __init__(
@@ -110,9 +114,11 @@ class RestEquations:
         time: float = 0.0,
         inputs: dict[str, float] | None = None,
     ) -> None:
-        check_reads_nothing(model)
-        check_drives_nothing(model, "at rest all rates are 0")
         self.model, layout = model, model.layout
+        for name in (*loads, *(inputs or {})):
+            if name in layout.driven:
+                by = layout.driven[name].rpartition(".")[0]
+                raise InputError(f"input '{name}' is driven by '{by}'. Expected an input that nothing drives.")
         u = input_values(model, model.new_signals(), np.array([time]), np.zeros((1, model.n_q)), np.array([True]))[0]
         for name, value in (inputs or {}).items():
             if not np.isfinite(value):
@@ -134,10 +140,21 @@ class RestEquations:
                 )
         self._bare = quiet(without(model.system, elements)) if elements else None
         self._second = model.second_order
+        self.signals = _signals(model)
+        """Coordinates whose rates are readings or driven inputs, and unknowns in place of their positions."""
+        self.constant = np.zeros(0, int)
+        """States whose rate is 0 whatever happens; they are held."""
         self._integrators: list[tuple[int, Call, int]] = []
         self.held = np.zeros(model.n_q, bool)
         self._integrators = self._find_integrators()
         self.held = self._without_effect()
+        self.constant = self._constant()
+
+    def unknowns(self, q: np.ndarray) -> np.ndarray:
+        """The unknowns to begin with at a position: its signals start at 0."""
+        q = np.array(q, float)
+        q[self.signals] = 0.0
+        return q
 
     def inputs(self, s: float) -> np.ndarray:
         """Value and zero rates of each input at load factor s, shape (n_u, 3)."""
@@ -146,13 +163,17 @@ class RestEquations:
         return u
 
     def point(self, q: np.ndarray, lam: np.ndarray, s: float) -> OperatingPoint:
-        """The state of rest at q."""
+        """The state of rest at q, whose signals are rates."""
         n, m = self.model.n_q, self.model.n_phi
-        v, zero = np.zeros(n), np.zeros(n)
+        v, zero, u = np.zeros(n), np.zeros(n), self.inputs(s)
+        if len(self.signals):
+            v[self.signals], q = q[self.signals], q.copy()
+            q[self.signals] = self.model.start.q[self.signals]
+            self.model.layout.put_driven(u[:, 0], v)
         for i, call, k in self._integrators:
             if self.held[i]:
                 v[i] = self._rate(call, k, q, s)
-        return OperatingPoint(q, v, v, zero, lam, np.zeros(m), self.inputs(s))
+        return OperatingPoint(q, v, v, zero, lam, np.zeros(m), u)
 
     def at(self, q: np.ndarray, lam: np.ndarray, s: float) -> RestBlocks:
         """Residual and derivatives at position q with multipliers lam (which enter K) and load factor s."""
@@ -162,6 +183,7 @@ class RestEquations:
         f, K, C, M = b.r2 - G.T @ lam, b.r2_q.toarray(), b.r2_v.toarray(), b.r2_a.toarray()
         blocks = RestBlocks(f, K, C, M, b.r3.copy(), G, growing + b.r2_u[:, :, 0] @ by_s, b.r3_u[:, :, 0] @ by_s)
         self._put_integrators(blocks, q, s)
+        self._put_signals(blocks)
         return blocks
 
     def blocks(self, point: OperatingPoint, s: float) -> Blocks:
@@ -179,6 +201,25 @@ class RestEquations:
             for name in ("r2", "r2_q", "r2_v", "r2_a", "r2_u")
         }
         return whole._replace(**mixed), whole.r2 - bare.r2
+
+    def _put_signals(self, b: RestBlocks) -> None:
+        """Derivatives by signals in place of those by their positions; what is constant does not change."""
+        b.K[:, self.signals] = b.C[:, self.signals]
+        b.C[:, self.signals] = b.M[:, self.signals] = 0.0
+        b.K[self.constant, self.constant] = 1.0
+
+    def _constant(self) -> np.ndarray:
+        """States of first order beside signals whose row is v = 0."""
+        if not len(self.signals):
+            return self.constant
+        model = self.model
+        b = model.derivatives.blocks(self.point(self.unknowns(model.start.q), np.zeros(model.n_phi), 1.0))
+        C, own = b.r2_v.toarray(), np.arange(model.n_q)
+        C[own, own] = 0.0
+        moved = [b.r2[:, None], b.r2_q.toarray(), C, b.r2_a.toarray(), b.r2_u.reshape(model.n_q, -1)]
+        still = ~np.any(np.hstack(moved), axis=1) & ~model.second_order
+        still[self.signals] = False
+        return np.flatnonzero(still)
 
     def _find_integrators(self) -> list[tuple[int, Call, int]]:
         """(coordinate, call, place among its own) of integrals: of second order, and in no row of their own at rest."""
@@ -227,3 +268,11 @@ class RestEquations:
             else:
                 b.f[i], b.C[i, i] = -self._rate(call, k, q, s), 1.0
                 b.K[i], b.f_s[i] = -by_q, -by_s
+
+
+def _signals(model: Model) -> np.ndarray:
+    """Own coordinates of elements whose rates are readings or driven inputs."""
+    found = {int(call.iq[-1]) for call in model.layout.dynamics if call.sensor is not None}
+    for element in model.system.forces:
+        found |= {model.layout.index[f"{element.name}.{name}"] for _, name in element.driven_inputs()}
+    return np.array(sorted(found), int)

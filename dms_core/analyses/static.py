@@ -55,16 +55,20 @@ class Equilibrium:
     equations: RestEquations
     load: float
     """Load factor; 1 with all loads."""
-    q: np.ndarray
-    lam: np.ndarray
-    """Multipliers of least norm."""
+    point: OperatingPoint
+    """The state of rest: multipliers are those of least norm, rates are 0 but where they are signals."""
     iterations: int
     linearisation: Linearisation
 
     @property
-    def point(self) -> OperatingPoint:
-        """The state of rest as an operating point."""
-        return self.equations.point(self.q, self.lam, self.load)
+    def q(self) -> np.ndarray:
+        """Coordinates, shape (n_q,)."""
+        return self.point.q
+
+    @property
+    def lam(self) -> np.ndarray:
+        """Multipliers of least norm, shape (n_phi,)."""
+        return self.point.lam
 
     @property
     def growth(self) -> float:
@@ -162,7 +166,6 @@ def static_equilibrium(
 
     Raises:
         InputError: a load or an input does not exist, or steps is no positive whole number.
-        ModelError: an element reads a sensor or drives an input, see driven_inputs.py.
         SimulationError: there is no equilibrium, or it is not unique; the free motion is named.
 
     Example:
@@ -175,7 +178,7 @@ def static_equilibrium(
         raise InputError("loads: Expected the names of the loads that are put on in steps, got none.")
     compiled = model if isinstance(model, Model) else Model(model)
     equations = RestEquations(compiled, loads, time, inputs)
-    q = compiled.start.q if start is None else np.asarray(start, float)
+    q = equations.unknowns(compiled.start.q if start is None else start)
     found = []
     for k in range(int(steps)):
         s = (k + 1.0) / steps
@@ -190,7 +193,8 @@ def equilibrium_at(equations: RestEquations, q: np.ndarray, lam: np.ndarray, s: 
     """A position of rest with its multipliers as an Equilibrium, linearised there."""
     point = equations.point(q, lam, s)
     linear = linearise(equations.model, point, held=np.flatnonzero(equations.held), blocks=equations.blocks(point, s))
-    return Equilibrium(equations.model, equations, s, q, lam, iterations, linear)
+    linear = linear.without([*equations.signals, *equations.constant])
+    return Equilibrium(equations.model, equations, s, point, iterations, linear)
 
 
 def relaxed(equations: RestEquations, q: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray, int]:

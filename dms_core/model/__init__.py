@@ -29,7 +29,7 @@ from dms_core.model.constraints import (
     Spherical,
     Universal,
 )
-from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
+from dms_core.model.contact import CylinderContact, SphereContact, SphereCylinderContact, SpherePairContact
 from dms_core.model.control import (
     DelayedError,
     ImpedanceController,
@@ -50,6 +50,7 @@ from dms_core.model.flexible import (
     FloatingFrame,
     Interface,
     InterfaceFrame,
+    LoadDistribution,
     ModalBody,
     ModalData,
     ModalNode,
@@ -59,6 +60,7 @@ from dms_core.model.flexible import (
 from dms_core.model.forces import (
     Bushing,
     BushingCurves,
+    BushingLoad,
     FirstOrder,
     Gravity,
     JointMotor,
@@ -110,6 +112,7 @@ __all__ = [
     "Belt",
     "Bushing",
     "BushingCurves",
+    "BushingLoad",
     "Constant",
     "ContactSensor",
     "CoordinateSensor",
@@ -147,6 +150,7 @@ __all__ = [
     "LinearCoupling",
     "Lines",
     "LoadCurve",
+    "LoadDistribution",
     "LumpedLoad",
     "MinimumJerk",
     "ModalBody",
@@ -174,6 +178,7 @@ __all__ = [
     "SensorPid",
     "Slider",
     "SphereContact",
+    "SphereCylinderContact",
     "SpherePairContact",
     "Spherical",
     "Spline",

@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from dms_core.model.constraints.couplings.linear_coupling import JointTerm
 from dms_core.model.element import Declaration
-from dms_core.model.flexible import BeamSection, Interface, ModalData
+from dms_core.model.flexible import BeamSection, Interface, LoadDistribution, ModalData
 from dms_core.model.forces import BushingCurves, LoadCurve
 from dms_core.model.muscles import ThelenCurves
 from dms_core.model.ropes import PathPoint
@@ -59,7 +59,17 @@ INTRODUCTIONS = {
     "sensors": "What is measured.",
     "inputs": "Courses in time u(t), named by the elements that follow them. `kind: input` may be left out.",
 }
-PARTS = (BeamSection, BushingCurves, Interface, JointTerm, LoadCurve, ModalData, PathPoint, ThelenCurves)
+PARTS = (
+    BeamSection,
+    BushingCurves,
+    Interface,
+    JointTerm,
+    LoadCurve,
+    LoadDistribution,
+    ModalData,
+    PathPoint,
+    ThelenCurves,
+)
 """Mappings inside declarations."""
 
 

@@ -23,7 +23,7 @@ from dms_core.simulation.iteration.rescue import HELPED, Place, Rescue
 from dms_core.simulation.options import SolverOptions, is_positive
 from dms_core.simulation.rates_between import rates_between
 from dms_core.simulation.slack import SlackSimulation, refuse_unilateral, unilateral_ropes
-from dms_core.simulation.snapshot import Mark, Snapshot, go_back, mark
+from dms_core.simulation.snapshot import Ending, Mark, Snapshot, go_back, mark
 from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, State, new_state
 from dms_core.simulation.step_control import OUTCOME
 
@@ -71,6 +71,15 @@ class World(Rescue):
         self.crossed_at = -math.inf
         """When that was [s]."""
         self._singular = self._why = ""
+
+    @property
+    def ending(self) -> Ending:
+        """How the last call of `advance` ended, beside its result: what a snapshot holds of it."""
+        return Ending(self.crossing, self.crossed_at, self._why)
+
+    @ending.setter
+    def ending(self, past: Ending) -> None:
+        self.crossing, self.crossed_at, self._why = past
 
     @property
     def tables(self) -> Packed:
@@ -171,12 +180,13 @@ class World(Rescue):
 
     def mark(self) -> Mark:
         """The present, to be put back to with `rewind`."""
-        return mark(self._tables, self.state, self.result)
+        return mark(self._tables, self.state, self.result, self.ending)
 
     def rewind(self, past: Mark) -> None:
         """Go back to a mark; what was recorded since is forgotten."""
         self._world = go_back(past, self._tables, self._world)
         self._tables, self.state, self.result = past.tables, self._world.values, past.result
+        self.ending = past.ending
 
     def _keep(self, rows: np.ndarray) -> None:
         """Take over recorded steps; a world that remembers the present only does nothing."""

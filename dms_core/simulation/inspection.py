@@ -41,7 +41,7 @@ class Inspection:
 
     def snapshot(self) -> Snapshot:
         """Everything that the future of this world depends on, as an immutable value that can be pickled."""
-        return snapshot.take(self.model, self._tables.values, self.state, self.options, self.result)
+        return snapshot.take(self.model, self._tables.values, self.state, self.options, self.result, self.ending)
 
     def restore(self, past: Snapshot) -> None:
         """Be the world that `past` was taken of: going on gives the same bits as going on from there.
@@ -56,6 +56,7 @@ class Inspection:
         tables = snapshot.tables_with(past.orders, self._tables, self.model)
         self._world = snapshot.put_back(past, tables, self._tables, self._world)
         self._tables, self.state, self.result = tables, self._world.values, past.result
+        self.ending = past.ending
 
     def operating_point(self, behind: bool = False) -> OperatingPoint:
         """The present state with the present inputs; `behind` takes the inputs behind a jump at the present time.

@@ -20,6 +20,7 @@ import numpy as np
 
 from dms_core.assembly.layout import GROUND_COORDINATES
 from dms_core.assembly.model import Model
+from dms_core.assembly.tables import Signals
 from dms_core.errors import InputError, ModelError, SimulationError
 from dms_core.model.constraints.rope_length import RopeLength
 from dms_core.model.geometry.path import path_length, start_length
@@ -28,6 +29,7 @@ from dms_core.model.system import System
 from dms_core.results import Result, SolveStats, Trajectory
 from dms_core.simulation.events import Crossing, advance_to_zero
 from dms_core.simulation.options import SolverOptions
+from dms_core.simulation.rates_between import rates_between
 from dms_core.simulation.state import CLOCK
 
 SLACK_START = 1e-9
@@ -102,6 +104,8 @@ class SlackSimulation:
         self._q, self._v = self.model.start.q.copy(), self.model.start.v.copy()
         self._record: list[np.ndarray] = []
         self._stats: list[SolveStats] = []
+        self._phases: list[tuple[float, Model]] = []
+        """End [s] and model of each phase so far."""
         self._message = ""
         self._signals: Any = self.model.new_signals()
 
@@ -158,7 +162,29 @@ class SlackSimulation:
                 raise KeyboardInterrupt
             raise SimulationError(f"nothing was computed: {self._message}")
         record = np.concatenate(self._record)
-        return Trajectory(self.model, self._signals, record, self.result, _sum(self._stats), self._message)
+        rates = self._rates_between if self.options.method == "radau5" else None
+        return Trajectory(self.model, self._signals, record, self.result, _sum(self._stats), self._message, rates)
+
+    def _rates_between(
+        self, model: Model, signals: Signals, times: np.ndarray, *guess: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `rates_between`, with the equations of the phase that each time lies in; at an event of the one before."""
+        q, v, a, lam = (np.array(x, float) for x in guess)
+        which = np.searchsorted([end for end, _ in self._phases], times)
+        for k in np.unique(which):
+            here, phase = which == k, self._phases[min(k, len(self._phases) - 1)][1]
+            rows = self._rows_of(phase)
+            v[here], a[here], found = rates_between(
+                phase, signals, times[here], q[here], v[here], a[here], lam[np.ix_(here, rows)]
+            )
+            lam[here] = 0.0
+            lam[np.ix_(here, rows)] = found
+        return v, a, lam
+
+    def _rows_of(self, phase: Model) -> np.ndarray:
+        """Place of each constraint row of a phase among those of the whole model."""
+        place = {name: k for k, name in enumerate(self.model.layout.row_names)}
+        return np.array([place[name] for name in phase.layout.row_names], int)
 
     def _excess(self, phase: Any, name: str) -> float:
         """Length of the path of a slack rope beyond that of the rope [m]."""
@@ -194,13 +220,13 @@ class SlackSimulation:
         self.time, self._message = phase.time, phase.message
         self._q, self._v = phase.state.q.copy(), phase.state.v.copy()
         self._stats.append(phase.stats())
+        self._phases.append((phase.time, phase.model))
         rows = phase.record()
         n, m, own = self.model.n_q, self.model.n_phi, phase.model.n_phi
         whole = np.zeros((len(rows), 1 + 3 * n + 2 * m))
         whole[:, : 1 + 3 * n] = rows[:, : 1 + 3 * n]
-        place = [self.model.layout.row_names.index(name) for name in phase.model.layout.row_names]
         for k in (0, 1):
-            whole[:, 1 + 3 * n + k * m + np.array(place, int)] = rows[
+            whole[:, 1 + 3 * n + k * m + self._rows_of(phase.model)] = rows[
                 :, 1 + 3 * n + k * own : 1 + 3 * n + (k + 1) * own
             ]
         self._record.append(whole)

@@ -1,14 +1,16 @@
 """A world as a value: everything that its future depends on, to be put back later, here or in another process.
 
-That is the present state (q, v, qdot, vdot, lam, mu), the past of the method, clock and counts, the inputs as they were
-set, the factorised matrices that are still in use, and the order of elimination, which may have been chosen anew. The
-model is not part of it: a snapshot names its model by the structure and by all numbers of it, and goes into no other.
-Inputs that are functions of time, and kernels, are told apart by their names only.
+That is the present state (q, v, qdot, vdot, lam, mu), the past of the method, clock and counts, the event that it
+stands on, the inputs as they were set, the factorised matrices that are still in use, and the order of elimination,
+which may have been chosen anew. The model is not part of it: a snapshot names its model by the structure and by all
+numbers of it, and goes into no other. Inputs that are functions of time, and kernels, are told apart by their names
+only.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
@@ -23,12 +25,27 @@ from dms_core.errors import InputError
 from dms_core.linear.lu import LuTables
 from dms_core.model.signals import Function
 from dms_core.results import Result
+from dms_core.simulation.events import Crossing
 from dms_core.simulation.methods.radau_state import NOT_USED
 from dms_core.simulation.options import SolverOptions
 from dms_core.simulation.state import CLOCK, State, with_storage
 
 GLOBAL_WORK = ("q", "v", "a", "lam", "mu", "u", "y", "r2", "gmu", "phi", "phi_v", "phi_a")
 """Fields of Work that outlive a kernel call; the others are local arrays, written before they are read."""
+
+
+class Ending(NamedTuple):
+    """How the last call of `advance` ended, beside its result."""
+
+    crossing: Crossing | None = None
+    """The event, where it was one; the next call knows by it that the world stands on that value."""
+    crossed_at: float = -math.inf
+    """When that was [s]."""
+    why: str = ""
+    """Of a failure, in sentences."""
+
+
+NO_EVENT = Ending()
 
 
 class Orders(NamedTuple):
@@ -60,6 +77,7 @@ class Snapshot:
     arrays: tuple[bytes, ...] = field(repr=False)
     """The arrays of `held_arrays`, in their order."""
     orders: Orders = field(repr=False, compare=False)
+    ending: Ending = NO_EVENT
 
 
 def held_arrays(state: State) -> Iterator[np.ndarray]:
@@ -96,12 +114,14 @@ def _structure(model: Model, signals: Signals) -> str:
     return _digest(model.layout.digest, signals.kind, signals.ptr, signals.jumps, functions)
 
 
-def take(model: Model, tables: Tables, state: State, options: SolverOptions, result: Result) -> Snapshot:
+def take(
+    model: Model, tables: Tables, state: State, options: SolverOptions, result: Result, ending: Ending
+) -> Snapshot:
     """The world as it is now."""
     orders = Orders(*(getattr(tables, name) for name in Orders._fields))
     return Snapshot(
         model.system.name, float(state.clock[CLOCK.t]), options, result, _structure(model, state.signals),
-        _digest(*model.numbers), tuple(x.tobytes() for x in held_arrays(state)), orders,
+        _digest(*model.numbers), tuple(x.tobytes() for x in held_arrays(state)), orders, ending,
     )  # fmt: skip
 
 
@@ -156,13 +176,14 @@ class Mark(NamedTuple):
     result: Result
     tables: Packed
     arrays: tuple[bytes, ...]
+    ending: Ending
     rows: int
     """Pieces of the record until then."""
 
 
-def mark(tables: Packed, state: State, result: Result) -> Mark:
+def mark(tables: Packed, state: State, result: Result, ending: Ending) -> Mark:
     """The world as it is now, without a record."""
-    return Mark(float(state.clock[CLOCK.t]), result, tables, tuple(x.tobytes() for x in held_arrays(state)), 0)
+    return Mark(float(state.clock[CLOCK.t]), result, tables, tuple(x.tobytes() for x in held_arrays(state)), ending, 0)
 
 
 def go_back(past: Mark, tables: Packed, world: Packed) -> Packed:

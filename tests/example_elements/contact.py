@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dms_core.model.contact import CylinderContact, SphereContact, SpherePairContact
+from dms_core.model.contact import CylinderContact, SphereContact, SphereCylinderContact, SpherePairContact
 from dms_core.model.element import Force
 from dms_core.model.sensors import ContactSensor
 from tests.example_elements import Example
@@ -21,6 +21,13 @@ SPHERES = SpherePairContact(
 CYLINDER = CylinderContact(
     name="touch", centre_j=(0.1, 0.2, -0.3), axis_j=(0.2, 0.4, 1.0), radius=0.8, length=0.6, **PLANE, **BODIES, **LAW
 )
+ON_A_CYLINDER = SphereCylinderContact(
+    name="touch", centre_i=(0.4, -0.1, 0.2), axis_i=(0.3, 0.2, 1.0), radius_i=2.0, length_i=40.0,
+    centre_j=(-0.2, 0.5, 0.1), radius_j=3.0, **BODIES, **LAW,
+)  # fmt: skip
+"""On its side. The spheres' centres of the next two are above an end of a wide disc, and beside a rod's rim."""
+ON_AN_END = ON_A_CYLINDER.model_copy(update={"radius_i": 30.0, "length_i": 0.02, "radius_j": 4.0})
+ON_A_RIM = ON_A_CYLINDER.model_copy(update={"radius_i": 0.02, "length_i": 0.02, "radius_j": 6.0})
 
 
 def _touch(element: Force, *inputs: str) -> Example:
@@ -52,6 +59,26 @@ def spheres_at_a_speed() -> Example:
     return _touch(SPHERES.model_copy(update={"impact_speed_input": "speed"}), "speed")
 
 
+def on_a_cylinder() -> Example:
+    """A sphere on the side of a cylinder."""
+    return _touch(ON_A_CYLINDER)
+
+
+def on_an_end() -> Example:
+    """On an end of it."""
+    return _touch(ON_AN_END)
+
+
+def on_a_rim() -> Example:
+    """On a rim."""
+    return _touch(ON_A_RIM)
+
+
+def on_a_cylinder_at_a_speed() -> Example:
+    """At an impact speed from an input."""
+    return _touch(ON_A_CYLINDER.model_copy(update={"impact_speed_input": "speed"}), "speed")
+
+
 def cylinder_at_a_speed() -> Example:
     """At an impact speed from an input."""
     return _touch(CYLINDER.model_copy(update={"impact_speed_input": "speed"}), "speed")
@@ -67,6 +94,11 @@ def sensed_sphere() -> Example:
     return _sensed(SPHERE)
 
 
+def sensed_on_a_rim() -> Example:
+    """Sensor of a sphere on a rim."""
+    return _sensed(ON_A_RIM)
+
+
 def sensed_cylinder() -> Example:
     """Sensor of one end."""
     return _sensed(CYLINDER)
@@ -80,6 +112,7 @@ def sensed_input() -> Example:
 EXAMPLES = {
     "sphere_contact": (sphere, sphere_on_ground),
     "sphere_pair_contact": (spheres, spheres_at_a_speed),
+    "sphere_cylinder_contact": (on_a_cylinder, on_an_end, on_a_rim, on_a_cylinder_at_a_speed),
     "cylinder_contact": (cylinder, cylinder_at_a_speed),
-    "contact_sensor": (sensed_sphere, sensed_cylinder, sensed_input),
+    "contact_sensor": (sensed_sphere, sensed_on_a_rim, sensed_cylinder, sensed_input),
 }

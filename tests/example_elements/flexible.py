@@ -12,6 +12,7 @@ from dms_core.model.flexible import (
     BeamSection,
     DistributedLoad,
     Interface,
+    LoadDistribution,
     ModalBody,
     ModalData,
 )
@@ -104,7 +105,8 @@ def modal_body() -> ModalBody:
     """A modal body with one interface."""
     rng, data = np.random.default_rng(2), modal_data()
     tip = Interface(name="tip", point=(0.4, 0.1, -0.2), translations=_random(rng, 3, 3), rotations=_random(rng, 3, 3))
-    return ModalBody(name="link", data=data, interfaces=(tip,), damping_ratio=0.2)
+    length = LoadDistribution(measure="length", total=1.3, moment=_random(rng, 3), translation=_random(rng, 3, 3))
+    return ModalBody(name="link", data=data, interfaces=(tip,), distributions=(length,), damping_ratio=0.2)
 
 
 def modal_system(**more) -> System:
@@ -142,11 +144,17 @@ def weight_on_modes() -> Example:
     return Example(modal_system(forces=[load]), load)
 
 
+def length_of_modes() -> Example:
+    """Per length, following."""
+    load = DistributedLoad(name="load", body="link", per_length=(0.3, -2.0, 1.0), axes="body")
+    return Example(modal_system(forces=[load]), load)
+
+
 EXAMPLES = {
     "floating_frame": (frame,),
     "interface_frame": (interface,),
     "modal_node": (node,),
     "beam_element": (beam, damped_beam),
     "beam_load": (gauge, damped_gauge),
-    "distributed_load": (load_on_beam, load_on_line, load_on_modes, weight_on_modes),
+    "distributed_load": (load_on_beam, load_on_line, load_on_modes, weight_on_modes, length_of_modes),
 }

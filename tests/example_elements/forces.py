@@ -7,6 +7,7 @@ from dms_core.model.flexible import Beam, BeamSection
 from dms_core.model.forces import (
     Bushing,
     BushingCurves,
+    BushingLoad,
     FirstOrder,
     Gravity,
     JointMotor,
@@ -146,6 +147,22 @@ def cushion_with_curves() -> Example:
     return _force(Bushing(name="cushion", body_i="upper", body_j="lower", stiffness=stiffness, curves=curves))
 
 
+def _gauged(example: Example) -> Example:
+    """The sensor of an example's bushing."""
+    gauge = BushingLoad(name="gauge", bushing="cushion")
+    return Example(pair(forces=[example.element], sensors=[gauge]), gauge)
+
+
+def gauge() -> Example:
+    """Six stiffnesses and dampings."""
+    return _gauged(cushion())
+
+
+def gauge_with_curves() -> Example:
+    """By table, without damping."""
+    return _gauged(cushion_with_curves())
+
+
 def wound_spring() -> Example:
     """A curve of several turns, with damping."""
     curve = LoadCurve(deflections=(-20.0, -2.0, 0.0, 5.0, 30.0), loads=(-60.0, -3.0, 0.0, 9.0, 80.0))
@@ -169,6 +186,7 @@ def motor() -> Example:
 
 EXAMPLES = {
     "bushing": (cushion, cushion_with_curves),
+    "bushing_load": (gauge, gauge_with_curves),
     "joint_motor": (motor,),
     "torsion_spring": (wound_spring, straight_wound_spring),
     "turn_counter": (counter,),

@@ -2,6 +2,7 @@
 
 from dms_core.model.contact.cylinder import CylinderContact
 from dms_core.model.contact.sphere import SphereContact
+from dms_core.model.contact.sphere_cylinder import SphereCylinderContact
 from dms_core.model.contact.sphere_pair import SpherePairContact
 
-__all__ = ["CylinderContact", "SphereContact", "SpherePairContact"]
+__all__ = ["CylinderContact", "SphereContact", "SphereCylinderContact", "SpherePairContact"]

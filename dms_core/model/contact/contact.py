@@ -38,12 +38,13 @@ class Contact(Force):
         """The impact's speed, where it is an input."""
         return () if self.impact_speed_input is None else (self.impact_speed_input,)
 
-    def placed(self, shape: int, **geometry) -> Placement:
+    def placed(self, shape: int, *, half_length: float = 0.0, **geometry) -> Placement:
         """The kernel call of a shape.
 
         Args:
             shape: first integer, see shapes.py.
-            geometry: s_i, normal, radius_i, s_j, axis, radius, see ContactNumbers.
+            half_length: of a cylinder of body i [m].
+            geometry: s_i, direction, radius_i, s_j, axis, radius, see ContactNumbers.
         """
         d = damping_number(self.restitution)
         inputs = self.input_names()
@@ -59,6 +60,7 @@ class Contact(Force):
                 damping=d if inputs else d / self.impact_speed,
                 friction=self.friction,
                 slip_speed=self.slip_speed,
+                half_length=half_length,
             ),
             pattern=Pattern(full, full, none),
         )

@@ -38,7 +38,7 @@ class CylinderContact(Contact):
             self.placed(
                 PLANE_DISC,
                 s_i=system.arm(self.body_i, self.point_i),
-                normal=unit(self.normal_i, f"{who}: normal_i"),
+                direction=unit(self.normal_i, f"{who}: normal_i"),
                 radius_i=0.0,
                 s_j=np.asarray(middle) + half * axis,
                 axis=axis,

@@ -1,13 +1,16 @@
 """Where two shapes touch: gap, normal and point of contact, and how they change with the coordinates.
 
-The first body carries a half-space or a sphere, the second one a sphere or a disc (one end of a cylinder):
+The first body carries a half-space, a sphere or a solid cylinder, the second one a sphere or a disc (one end of a
+cylinder):
 
     plane, sphere    n = A_i m,        g = n . (c - P) - R,     X = c - (n . (c - P)) n
     sphere, sphere   n = d / |d|,      g = |d| - R_i - R_j,     X = c_j - (R_j + g / 2) n,      d = c_j - c_i
     plane, disc      Y = c - R t / sqrt(|t|^2 + e^2),   t = n - (n . f) f,   g = n . (Y - P),   X = Y - g n
+    cylinder, sphere n = w_r t / |t| + w_a f,   g = D - R,   X = c - (R + g / 2) n,   d = c - P,   t = d - (d . f) f
 
 with the centre c, the disc's axis f = A_j b and its deepest point Y. A disc that lies flat in the plane has no deepest
-point: e = 1e-6 lets Y pass to its centre there. A point is a sphere without radius.
+point: e = 1e-6 lets Y pass to its centre there. A point is a sphere without radius. Of a cylinder, P is the middle,
+f = A_i b the axis, D the distance of c from its surface and (w_r, w_a) the slopes of D (solid_cylinder.py).
 
 A change is a derivative by one local coordinate, with the others held.
 """
@@ -18,6 +21,7 @@ import math
 from typing import NamedTuple
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.contact.solid_cylinder import distance, distance_change
 from dms_core.model.geometry.rotations import (
     across,
     across_change,
@@ -32,7 +36,7 @@ from dms_core.model.geometry.rotations import (
     vec,
 )
 
-PLANE_SPHERE, SPHERES, PLANE_DISC = 0, 1, 2
+PLANE_SPHERE, SPHERES, PLANE_DISC, CYLINDER_SPHERE = 0, 1, 2, 3
 """First integer of a contact's table."""
 FLAT = 1e-6
 """Sine of the angle between a disc and the plane from which on its deepest point passes to its centre [-]."""
@@ -46,8 +50,9 @@ class ContactNumbers(NamedTuple):
     """Places of the kernel's numbers."""
 
     s_i: int = 0
-    """Point of the plane, or centre of the first sphere, from the centre of mass of body i [m]."""
-    normal: int = 3
+    """Point of the plane, or centre of the sphere or cylinder of body i, from its centre of mass [m]."""
+    direction: int = 3
+    """Normal of the plane, or axis of the cylinder, of body i."""
     radius_i: int = 6
     s_j: int = 7
     """Centre of the sphere or disc from the centre of mass of body j [m]."""
@@ -58,6 +63,8 @@ class ContactNumbers(NamedTuple):
     """D [s/m]; with an impact speed from an input, d."""
     friction: int = 16
     slip_speed: int = 17
+    half_length: int = 18
+    """Of the cylinder of body i [m]."""
 
 
 CONTACT = ContactNumbers()
@@ -73,7 +80,14 @@ def touching(shape, par, q):
         length = max(math.sqrt(dot(d, d)), SHORTEST)
         n, g = scale(1.0 / length, d), length - par[CONTACT.radius_i] - R
         return g, n, sub(c, scale(R + 0.5 * g, n))
-    n = rotated(q, BODY_I, vec(par, CONTACT.normal))
+    n = rotated(q, BODY_I, vec(par, CONTACT.direction))
+    if shape == CYLINDER_SPHERE:
+        d = sub(c, P)
+        along, t = dot(n, d), across(d, n)
+        rho = max(math.sqrt(dot(t, t)), SHORTEST)
+        D, w_r, w_a, _ = distance(par[CONTACT.radius_i], par[CONTACT.half_length], rho, along)
+        n, g = add(scale(w_r / rho, t), scale(w_a, n)), D - R
+        return g, n, sub(c, scale(R + 0.5 * g, n))
     if shape == PLANE_DISC:
         t = across(n, rotated(q, BODY_J, vec(par, CONTACT.axis)))
         Y = sub(c, scale(R / _size(t), t))
@@ -121,8 +135,10 @@ def touch_change(shape, par, q, k):
         dn = scale(1.0 / length, sub(dd, scale(dg, n)))
         reach = R + 0.5 * (length - par[CONTACT.radius_i] - R)
         return dg, dn, sub(dc, add(scale(0.5 * dg, n), scale(reach, dn)))
-    m = vec(par, CONTACT.normal)
+    m = vec(par, CONTACT.direction)
     n, dn = rotated(q, BODY_I, m), turned_by(q, BODY_I, dp_i, m)
+    if shape == CYLINDER_SPHERE:
+        return _cylinder_change(par, R, n, dn, sub(c, P), sub(dc, dP), dc)
     if shape == PLANE_DISC:
         b = vec(par, CONTACT.axis)
         f, df = rotated(q, BODY_J, b), turned_by(q, BODY_J, dp_j, b)
@@ -135,3 +151,17 @@ def touch_change(shape, par, q, k):
         return dg, dn, sub(dY, add(scale(dg, n), scale(g, dn)))
     h, dh = dot(n, sub(c, P)), dot(dn, sub(c, P)) + dot(n, sub(dc, dP))
     return dh, dn, sub(dc, add(scale(dh, n), scale(h, dn)))
+
+
+@compiled
+def _cylinder_change(par, R, f, df, d, dd, dc):
+    """(dg, dn, dX) of a sphere at d from the middle of a cylinder with the axis f, for changes of f, d and c."""
+    along, t = dot(f, d), across(d, f)
+    rho = max(math.sqrt(dot(t, t)), SHORTEST)
+    e, dt = scale(1.0 / rho, t), across_change(d, f, dd, df)
+    d_along, d_rho = dot(df, d) + dot(f, dd), dot(e, dt)
+    D, w_r, w_a, bend = distance(par[CONTACT.radius_i], par[CONTACT.half_length], rho, along)
+    dg, dw_r, dw_a = distance_change(w_r, w_a, bend, d_rho, d_along)
+    n = add(scale(w_r, e), scale(w_a, f))
+    dn = add(add(scale(dw_r, e), scale(w_r / rho, sub(dt, scale(d_rho, e)))), add(scale(dw_a, f), scale(w_a, df)))
+    return dg, dn, sub(dc, add(scale(0.5 * dg, n), scale(R + 0.5 * (D - R), dn)))

@@ -28,7 +28,7 @@ class SphereContact(Contact):
         return self.placed(
             PLANE_SPHERE,
             s_i=system.arm(self.body_i, self.point_i),
-            normal=unit(self.normal_i, f"{self.kind} '{self.name}': normal_i"),
+            direction=unit(self.normal_i, f"{self.kind} '{self.name}': normal_i"),
             radius_i=0.0,
             s_j=system.arm(self.body_j, self.centre_j),
             axis=(0.0, 0.0, 0.0),

@@ -31,7 +31,7 @@ class SpherePairContact(Contact):
         return self.placed(
             SPHERES,
             s_i=system.arm(self.body_i, self.centre_i),
-            normal=(0.0, 0.0, 0.0),
+            direction=(0.0, 0.0, 0.0),
             radius_i=self.radius_i,
             s_j=system.arm(self.body_j, self.centre_j),
             axis=(0.0, 0.0, 0.0),

@@ -25,17 +25,27 @@ def sensor_of(system, component: str) -> tuple[Sensor, int]:
 
 
 def _check_readable(system, sensor: Sensor, component: str) -> None:
-    """Refuse sensors of forces that are solved for together with the equation that would read them."""
+    """Refuse sensors of constraint forces, and of sums that no equation evaluates.
+
+    Constraint forces enter the equations as phi_q^T lam alone. An output that acts at once on what it reads of them is
+    in a loop with itself, M vdot + phi_q^T lam = f(y(lam)), which for some gain has no solution; and lam is not unique
+    where constraints are redundant, whose independent rows may change along a motion.
+    """
+    named, place = f"sensor component '{component}'", sensor.place(system)
+    if place.constraint:
+        raise ModelError(
+            f"{named} is a force of the constraint '{place.constraint}', which is solved for together with the "
+            "accelerations: a controller that reads it would be in a loop with its own output, and a share of "
+            "redundant constraints is not even unique. Measure it as a load cell does, on a part that gives way: put a "
+            "bushing with a bushing_load, a beam with a beam_load, or an elastic_rope with a rope_sensor, into the "
+            "path of the force; its stiffness and damping are the cell's low-pass."
+        )
     if sensor.composition != COMPOSITIONS.none:
-        what = "is composed from the forces of other elements"
-    elif sensor.place(system).constraint:
-        what = f"reads a force of the constraint '{sensor.place(system).constraint}'"
-    else:
-        return
-    raise ModelError(
-        f"sensor component '{component}' {what}, which no equation can read. Expected one of positions, rates, "
-        "accelerations, states or inputs; the force of a spring, an elastic rope or a bushing follows from these."
-    )
+        raise ModelError(
+            f"{named} is composed from the forces of other elements ({', '.join(place.sources)}), which only results "
+            "evaluate. Expected a sensor of one element: a bushing_load, beam_load, rope_sensor, muscle_sensor or "
+            "contact_sensor, or one of positions, rates and states, of which a state_space makes a spring's force."
+        )
 
 
 def read_at_rest(system, component: str, q: np.ndarray, u: np.ndarray) -> float:

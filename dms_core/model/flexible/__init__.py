@@ -8,6 +8,7 @@ from dms_core.model.flexible.distributed_load import DistributedLoad
 from dms_core.model.flexible.modal.craig_bampton import craig_bampton, orthogonal
 from dms_core.model.flexible.modal.floating_frame import FloatingFrame
 from dms_core.model.flexible.modal.interface_frame import InterfaceFrame
+from dms_core.model.flexible.modal.load_distribution import LoadDistribution
 from dms_core.model.flexible.modal.modal_body import Interface, ModalBody
 from dms_core.model.flexible.modal.modal_data import ModalData
 from dms_core.model.flexible.modal.modal_node import ModalNode
@@ -21,6 +22,7 @@ __all__ = [
     "FloatingFrame",
     "Interface",
     "InterfaceFrame",
+    "LoadDistribution",
     "ModalBody",
     "ModalData",
     "ModalNode",

@@ -10,7 +10,8 @@ so that a load q per length, from q_i to q_j, does the work of point forces on t
 
 whose moments are those of a clamped beam, q L^2 / 12 for a uniform load: with them deflections at nodes are exact as
 far as the beam's are. On a rigid line from a to b, q_a to q_b, the same work is that of L q_a / 2 at (2 a + b) / 3 and
-of L q_b / 2 at (a + 2 b) / 3. A load that follows turns with the section that it is put on.
+of L q_b / 2 at (a + 2 b) / 3. A load that follows turns with the section that it is put on. A modal body takes it on
+frame and modes, as its mass, length or volume is spread over them (modal/load_distribution.py).
 """
 
 from __future__ import annotations
@@ -37,11 +38,12 @@ ORIGIN = (0.0, 0.0, 0.0)
 class SpreadNumbers(NamedTuple):
     """Places of the kernel's numbers on a modal body; those of a point force are LoadNumbers."""
 
-    mass: int = 0
+    amount: int = 0
+    """Of mass, length or volume."""
     load: int = 1
-    """Per mass."""
+    """Per amount."""
     moment: int = 4
-    """c_0, then the columns of P."""
+    """c_0 or s, then the columns of P."""
 
 
 SPREAD = SpreadNumbers()
@@ -57,13 +59,13 @@ def distributed_load(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     own = scale(factor, vec(par, SPREAD.load))
     g = rotated(q, 0, own) if ip[0] == 1 else own
     for i in range(3):
-        r[i] -= par[SPREAD.mass] * g[i]
+        r[i] -= par[SPREAD.amount] * g[i]
     add_moment_load(par, SPREAD.moment, ip[2], g, q, level, r, Jq)
     if level > 0 and ip[0] == 1:
         turning = columns(q, 0, own)
         for i in range(3):
             for k in range(4):
-                Jq[i, 3 + k] -= par[SPREAD.mass] * turning[k][i]
+                Jq[i, 3 + k] -= par[SPREAD.amount] * turning[k][i]
         add_following(par, SPREAD.moment, ip[2], own, q, Jq)
 
 
@@ -82,8 +84,9 @@ def distributed_load_by_input(ip, par, q, v, a, u, Ju):
 class DistributedLoad(Force):
     """Load per length, volume or mass, fixed in direction or following the body, constant or multiplied by an input.
 
-    It lies on all of a beam, on all mass of a modal body, or on the line from `start` to `end` of a rigid body, where
-    its resultant acts. Weight by `per_mass` replaces that of a `gravity` for this body; do not declare both.
+    It lies on all of a beam, on the mass of a modal body or on what its `distributions` give, or on the line from
+    `start` to `end` of a rigid body, where its resultant acts. Weight by `per_mass` replaces that of a `gravity` for
+    this body; do not declare both.
     """
 
     kind: ClassVar[str] = "distributed_load"
@@ -91,7 +94,7 @@ class DistributedLoad(Force):
     input_kernel: ClassVar = distributed_load_by_input
     body: str = Field(description="beam, modal body, or rigid body")
     per_length: Vector | None = Field(default=None, description="load per length [N/m]")
-    per_volume: Vector | None = Field(default=None, description="load per volume, of a beam [N/m^3]")
+    per_volume: Vector | None = Field(default=None, description="load per volume, of a beam or modal body [N/m^3]")
     per_mass: Vector | None = Field(default=None, description="load per mass, such as gravity [N/kg]")
     end_factor: float = Field(
         default=1.0, description="intensity at the far end over that at the first; it varies linearly between [-]"
@@ -171,13 +174,25 @@ class DistributedLoad(Force):
         return [(body.name, near, 0.5 * length * load), (body.name, far, 0.5 * length * self.end_factor * load)]
 
     def _on_modal_body(self, body: ModalBody) -> Placement:
-        """The load on the mass of frame and modes."""
-        if self.per_mass is None or self.start is not None or self.end is not None or self.end_factor != 1.0:
+        """The load on frame and modes."""
+        who = f"distributed_load '{self.name}'"
+        if self.start is not None or self.end is not None or self.end_factor != 1.0:
             raise ModelError(
-                f"distributed_load '{self.name}': Expected per_mass without start, end and end_factor for the modal "
-                f"body '{self.body}': the invariants of its modes hold its mass, not where its nodes are."
+                f"{who}: Expected no start, end and end_factor for the modal body '{self.body}': where the load lies, "
+                "and how its intensity varies, is in the loads that its distributions come from."
             )
-        data = body.data
+        data, load = body.data, next(x for x in (self.per_mass, self.per_length, self.per_volume) if x is not None)
+        amount, moment, translation = data.mass, data.mass_moment, data.translation
+        if self.per_mass is None:
+            measure = "length" if self.per_length is not None else "volume"
+            found = {one.measure: one for one in body.distributions}
+            if measure not in found:
+                raise ModelError(
+                    f"{who}: Expected per_mass, or a modal body with a distribution of its {measure}, got "
+                    f"'{self.body}' with {', '.join(found) or 'none'}: the invariants of its modes hold its mass, not "
+                    f"where its nodes are. Give loads={{'{measure}': ...}} to ModalBody.of."
+                )
+            amount, moment, translation = found[measure].total, found[measure].moment, found[measure].translation
         by_q = moment_pattern(data.size)
         by_q[:3, 3:7] = self.axes == "body"
         none = np.zeros_like(by_q)
@@ -185,7 +200,7 @@ class DistributedLoad(Force):
             bodies=(body.frame,), coordinates=body.modes, inputs=self.input_names(),
             integers=(int(self.axes == "body"), int(self.input is not None), data.size),
             numbers=numbers_at(
-                SPREAD, mass=data.mass, load=self.per_mass, moment=[data.mass_moment, *data.translation]
+                SPREAD, amount=amount, load=load, moment=[moment, *translation]
             ),
             pattern=Pattern(by_q, none, none),
         )  # fmt: skip

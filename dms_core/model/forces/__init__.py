@@ -1,6 +1,7 @@
 """Forces (paper sect. 3.1): loads, springs, dampers, and differential equations of their own."""
 
 from dms_core.model.forces.bushing import Bushing, BushingCurves
+from dms_core.model.forces.bushing_load import BushingLoad
 from dms_core.model.forces.first_order import FirstOrder
 from dms_core.model.forces.gravity import Gravity
 from dms_core.model.forces.joint.joint_motor import JointMotor
@@ -16,6 +17,7 @@ from dms_core.model.forces.spring_damper import SpringDamper
 __all__ = [
     "Bushing",
     "BushingCurves",
+    "BushingLoad",
     "FirstOrder",
     "Gravity",
     "JointMotor",

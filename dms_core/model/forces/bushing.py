@@ -65,7 +65,7 @@ def _four(par, k):
 
 
 @compiled
-def _put_deflections(par, q, v, y, G):
+def put_deflections(par, q, v, y, G):
     """y into `y` and y_q into rows 0 to 5 of G, which are zero."""
     s_i, s_j, ci, cj = vec(par, BUSHING.s_i), vec(par, BUSHING.s_j), _four(par, BUSHING.c_i), _four(par, BUSHING.c_j)
     for k in range(3):
@@ -78,7 +78,7 @@ def _put_deflections(par, q, v, y, G):
 
 
 @compiled
-def _add_second(par, q, v, F, W, H):
+def add_second(par, q, v, F, W, H):
     """(y_q v)_q into rows 0 to 5 of W, which are zero, and H += sum_k F_k y_k,qq."""
     s_i, s_j, ci, cj = vec(par, BUSHING.s_i), vec(par, BUSHING.s_j), _four(par, BUSHING.c_i), _four(par, BUSHING.c_j)
     d = sub(point(q, 7, s_j), point(q, 0, s_i))
@@ -102,7 +102,7 @@ def bushing(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     """ip: where each curve begins. Ja, which stays zero, is borrowed for y_q, (y_q v)_q, y and F."""
     _clear(Ja)
     G, W, y, F = Ja, Ja[RATES:], Ja[DEFLECTIONS], Ja[DEFLECTIONS + 1]
-    _put_deflections(par, q, v, y, G)
+    put_deflections(par, q, v, y, G)
     for k in range(6):
         rate = 0.0
         for j in range(14):
@@ -112,7 +112,7 @@ def bushing(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
         for j in range(14):
             r[j] += F[k] * G[k, j]
     if level > 0:
-        _add_second(par, q, v, F, W, Jq)
+        add_second(par, q, v, F, W, Jq)
         for k in range(6):
             _, stiffness = curve_load(par, ip[k], y[k])
             c = par[BUSHING.damping + k]

@@ -181,7 +181,13 @@ class Ida:
         )
 
     def run(
-        self, world: World, times: np.ndarray, rtol: float, atol: tuple[np.ndarray, np.ndarray], first: float = 0.0
+        self,
+        world: World,
+        times: np.ndarray,
+        rtol: float,
+        atol: tuple[np.ndarray, np.ndarray],
+        first: float = 0.0,
+        order: int = 5,
     ) -> tuple[np.ndarray, Counts]:
         """Positions at the times, shape (k, n_q), and what they took.
 
@@ -191,6 +197,7 @@ class Ida:
             rtol: relative tolerance.
             atol: absolute ones of q and of v, shape (n_q,) each.
             first: first step [s]; 0 takes IDA's own.
+            order: highest order of its formula.
         """
         world.settle()
         s, known = world.state, world.tables.values
@@ -216,6 +223,7 @@ class Ida:
         self._call("IDASetNonlinConvCoef", memory, DOUBLE(NEWTON_COEFFICIENT))
         self._call("IDASetMaxNumSteps", memory, LONG(10_000_000))
         self._call("IDASetInitStep", memory, DOUBLE(first))
+        self._call("IDASetMaxOrd", memory, order)
         q, reached = np.tile(s.q, (len(times), 1)), DOUBLE()
         for k, t in enumerate(times):
             self._call("IDASolve", memory, DOUBLE(t), ctypes.byref(reached), y_, yp_, 1)

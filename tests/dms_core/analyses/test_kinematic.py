@@ -10,8 +10,21 @@ import pytest
 from dms_core import SolverOptions, simulate
 from dms_core.analyses import driver_loads, kinematic
 from dms_core.errors import InputError, ModelError, ModelWarning, SimulationError
-from dms_core.model import AngleDriver, Constant, Harmonic, Input, Lines, MinimumJerk, Samples, System
+from dms_core.model import (
+    AngleDriver,
+    Constant,
+    Gear,
+    Harmonic,
+    Input,
+    Lines,
+    MinimumJerk,
+    Samples,
+    System,
+    TorsionSpring,
+    TurnCounter,
+)
 from tests.dms_core.analyses.mechanisms import four_bar, four_bar_angles, slider_crank
+from tests.dms_core.model.constraints.wheels import axle, wheel
 
 EXACT = 1e-10
 """Positions are closed to 1e-13; velocities and accelerations follow from linear equations of condition below 1e3."""
@@ -38,6 +51,45 @@ class TestSliderCrank:
         np.testing.assert_allclose(y["place.velocity.x"], rate, atol=EXACT)
         np.testing.assert_allclose(y["place.acceleration.x"], acceleration, atol=1e-8)
         assert result.singular == ()
+
+
+class TestTurns:
+    """Joints that turn more than once, for which poses do not hold the whole turns."""
+
+    def wheels(self, *parts, turns: float, forces=(), inputs=()) -> System:
+        """A wheel that is driven by so many turns in a second, and one beside it."""
+        second = wheel("second", 0.05, 0.3)
+        first = wheel("first", 0.02)
+        course = Lines(times=(0.0, 1.0), values=(0.0, 2.0 * math.pi * turns))
+        drive = AngleDriver(name="drive", joint="first_axle", input="course")
+        return System(
+            bodies=[first, second], constraints=[axle(first), axle(second), drive, *parts], forces=forces,
+            inputs=[Input(name="course", signal=course), *inputs],
+        )  # fmt: skip
+
+    @pytest.mark.parametrize(("ratio", "turns"), [(-1.5, 7.0), (2.0 / 3.0, -4.0), (-3.0, 5.0)])
+    def test_a_gear_turns_on_and_on(self, ratio, turns):
+        gear = Gear(name="gear", joint_i="first_axle", joint_j="second_axle", ratio=ratio)
+        counters = [TurnCounter(name=f"{n}_turns", joint=f"{n}_axle") for n in ("first", "second")]
+        # Few samples: a turn and more between two of them.
+        result = kinematic(self.wheels(gear, turns=turns, forces=counters), np.linspace(0.0, 1.0, 5)).check()
+        first = 2.0 * math.pi * turns * result.t
+        np.testing.assert_allclose(result.states.coordinate("first_turns.angle"), first, atol=1e-11)
+        np.testing.assert_allclose(result.states.coordinate("second_turns.angle"), ratio * first, atol=1e-11)
+        np.testing.assert_allclose(result.states.rate("second_turns.angle"), 2.0 * math.pi * turns * ratio, rtol=1e-11)
+        # Wheels that turn evenly need no moment.
+        assert np.abs(driver_loads(result.states.model, result.states)["drive"]).max() < 1e-10
+
+    def test_a_spring_that_is_wound_up_loads_its_driver(self):
+        """M = k theta after five turns, which the driver of a wheel that turns evenly gives."""
+        spring = TorsionSpring(name="coil", joint="first_axle", stiffness=0.3, damping=0.01)
+        hold = AngleDriver(name="hold", joint="second_axle", input="still")
+        still = Input(name="still", signal=Constant(value=0.0))
+        system = self.wheels(hold, turns=5.0, forces=[spring], inputs=[still])
+        result = kinematic(system, np.linspace(0.0, 1.0, 21)).check()
+        load = driver_loads(result.states.model, result.states)["drive"]
+        w = 10.0 * math.pi
+        np.testing.assert_allclose(load, 0.3 * w * result.t + 0.01 * w, atol=1e-8)
 
 
 class TestFourBar:

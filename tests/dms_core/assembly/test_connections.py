@@ -33,6 +33,7 @@ from dms_core.model import (
     RopeSensor,
     SensorPid,
     SphereContact,
+    SphereCylinderContact,
     SpherePairContact,
     StateSpace,
     System,
@@ -91,6 +92,10 @@ def everything() -> System:
                 name="roller", body_j="arm", point_i=(0.0, 0.5, 0.0), normal_i=(0.1, 1.0, 0.2), axis_j=(0.3, 0.2, 1.0),
                 radius=0.2, length=0.3, stiffness=30.0, friction=0.2, slip_speed=0.1,
             ),
+            SphereCylinderContact(
+                name="bar", body_i="arm", body_j="ball", axis_i=(0.3, 0.2, 1.0), radius_i=0.3, length_i=0.9,
+                radius_j=0.3, stiffness=60.0, friction=0.2, slip_speed=0.1,
+            ),
             ElasticRope(name="tether", path=TO_BALL, axial_stiffness=20.0, free_length=0.8, damping=0.5),
             Winch(
                 name="hoist", joint="hinge", radius=0.1, path=TO_BALL, axial_stiffness=20.0, free_length=0.7,
@@ -100,6 +105,7 @@ def everything() -> System:
         sensors=[
             RopeSensor(name="cell", rope="rope", components=("tension",)),
             ContactSensor(name="gap", contact="touch"),
+            ContactSensor(name="bar_gap", contact="bar"),
             CoordinateSensor(name="current", coordinate="motor.current"),
         ],
         inputs=["pull", "push", "volts", "speed", Input(name="wish", signal=Constant(value=2.0))],
@@ -173,7 +179,8 @@ def test_the_newton_matrix_is_that_of_the_blocks(world):
 @pytest.mark.parametrize(
     ("element", "number"),
     [("pid", "kp"), ("second", "filter_time"), ("block", "A.0.0"), ("block", "D.0.1"), ("motor", "gear_ratio"),
-     ("motor", "rotor_inertia"), ("touch", "radius"), ("pair", "friction"), ("roller", "radius"), ("hoist", "radius"),
+     ("motor", "rotor_inertia"), ("touch", "radius"), ("pair", "friction"), ("roller", "radius"),
+     ("bar", "radius_i"), ("bar", "axis_i.1"), ("hoist", "radius"),
      ("tether", "free_length"), ("rope", "path.0.point.1"), ("arm", "mass")],
 )  # fmt: skip
 def test_derivatives_by_numbers_are_those_of_two_models(world, element, number):
@@ -206,7 +213,8 @@ def test_an_operating_point_holds_what_is_driven(world):
     for name, coordinate in layout.driven.items():
         assert at.u[layout.input_index[name], 0] == at.v[layout.index[coordinate]]
     y = dict(zip([n for n, _ in layout.outputs], world.read(), strict=True))
-    # Both contacts press and both ropes pull: nothing above is a derivative of 0.
+    assert y["bar_gap.normal"] > 0.1
+    # All contacts press and both ropes pull: nothing above is a derivative of 0.
     assert y["gap.normal"] > 0.1 and y["gap.gap"] < -0.1 and at.u[layout.input_index["speed"], 0] > 0.1
     assert at.v[layout.index["pid.reading"]] == pytest.approx(y["angle.angle"], abs=1e-9)
     assert at.v[layout.index["second.reading"]] == pytest.approx(y["cell"], rel=1e-9)
@@ -288,17 +296,18 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a reaction": (
         {"forces": [pid(sensor="load.Fx"), ROPE],
          "sensors": [JointReaction(name="load", constraint="hinge", body="arm")]},
-        "sensor_pid 'pid': sensor component 'load.Fx' is composed from the forces of other elements",
+        "sensor_pid 'pid': sensor component 'load.Fx' is a force of the constraint 'hinge', which is solved for .*"
+        "a bushing with a bushing_load, a beam with a beam_load, or an elastic_rope with a rope_sensor, into the path",
     ),
     "a moment": (
         {"forces": [pid(sensor="moment"), ROPE],
          "sensors": [JointMoment(name="moment", joint="hinge", elements=("rope",))]},
-        "sensor component 'moment' is composed from the forces of other elements",
+        r"sensor component 'moment' is composed from the forces of other elements \(rope\), which only results",
     ),
     "the tension of a fixed rope": (
         {"forces": [pid(sensor="cell"), ROPE], "constraints": [FIXED],
          "sensors": [RopeSensor(name="cell", rope="fixed", components=("tension",))]},
-        "sensor component 'cell' reads a force of the constraint 'fixed'",
+        "sensor component 'cell' is a force of the constraint 'fixed', which is solved for together with the accel",
     ),
     "no such sensor of a block": (
         {"forces": [StateSpace(name="b", sensors=("x",), outputs=("pull",), D=((1.0,),)), ROPE]},

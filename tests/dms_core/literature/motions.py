@@ -55,20 +55,20 @@ SPIN = np.array([0.02, 2.0, 0.02])
 """Its angular velocity at the start, about the middle axis but for a hundredth [rad/s]."""
 
 
-def tumbling_spin(times: np.ndarray) -> np.ndarray:
+def tumbling_spin(times: np.ndarray, spin: np.ndarray = SPIN) -> np.ndarray:
     """Angular velocity in body axes: Jacobi's elliptic functions (Landau and Lifshitz, Mechanics, sect. 37).
 
     For 2 E J2 < L^2 it turns about the third axis: omega = (w1 cn, w2 sn, w3 dn), with the phase of the start.
     """
     J1, J2, J3 = BODY
-    E2, L2 = BODY @ SPIN**2, ((BODY * SPIN) ** 2).sum()
+    E2, L2 = BODY @ spin**2, ((BODY * spin) ** 2).sum()
     assert L2 > E2 * J2
     w1 = np.sqrt((E2 * J3 - L2) / (J1 * (J3 - J1)))
     w2 = np.sqrt((E2 * J3 - L2) / (J2 * (J3 - J2)))
     w3 = np.sqrt((L2 - E2 * J1) / (J3 * (J3 - J1)))
     rate = np.sqrt((J3 - J2) * (L2 - E2 * J1) / (J1 * J2 * J3))
     m = (J2 - J1) * (E2 * J3 - L2) / ((J3 - J2) * (L2 - E2 * J1))
-    phase = _inverse_sn(SPIN[1] / w2, SPIN[0], m)
+    phase = _inverse_sn(spin[1] / w2, spin[0], m)
     sn, cn, dn, _ = ellipj(rate * times + phase, m)
     return np.column_stack([w1 * cn, w2 * sn, w3 * dn])
 
@@ -79,13 +79,13 @@ def _inverse_sn(value: float, cosine: float, m: float) -> float:
     return u if cosine > 0.0 else 2.0 * float(ellipk(m)) - u
 
 
-def tumbling_positions(times: np.ndarray) -> np.ndarray:
+def tumbling_positions(times: np.ndarray, spin: np.ndarray = SPIN, start=(1.0, 0.0, 0.0, 0.0)) -> np.ndarray:
     """Place and Euler parameters of the free body: its attitude follows from the closed form of its spin."""
 
     def rates(t, p):  # noqa: ANN001, ANN202
-        return 0.5 * g_matrix(p).T @ tumbling_spin(np.array([t]))[0]
+        return 0.5 * g_matrix(p).T @ tumbling_spin(np.array([t]), spin)[0]
 
-    p = solved(rates, [1.0, 0.0, 0.0, 0.0], times)
+    p = solved(rates, list(start), times)
     return np.column_stack([np.zeros((len(times), 3)), p])
 
 

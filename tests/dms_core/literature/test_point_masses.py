@@ -1,7 +1,6 @@
 """Closed forms of point masses: pendulum (IFToMM A01), Atwood machines, spring and mass.
 
-Values and definitions: tests/reference/dae. The Atwood machine with a massive pulley is not here: a rope that drives a
-turning pulley without slip (length r theta) is no element of the platform.
+Values and definitions: tests/reference/dae. The Atwood machine with a massive pulley is that of test_drum_rope.py.
 """
 
 from __future__ import annotations
@@ -39,25 +38,30 @@ def _problem(name: str) -> dict:
     return json.loads((REFERENCE / "dae" / f"{name}.json").read_text())
 
 
+PENDULUM_ROWS = np.array(_problem("iftomm_A01_simple_pendulum")["reference"]["iftomm_rows"])
+"""t, x, y, vx, vy."""
+
+
+def pendulum() -> System:
+    """1 kg on a massless rod of 1 m, from the horizontal."""
+    return System(
+        "pendulum",
+        bodies=[PointMass(name="bob", mass=1.0, position=(-1.0, 0.0, 0.0))],
+        constraints=[Distance(name="rod", body_j="bob"), PlaneGuide(name="plane", body_j="bob", normal_i=(0, 0, 1))],
+        forces=[DOWN],
+    )
+
+
 class TestSimplePendulum:
     """1 kg on a massless rod of 1 m, released from the horizontal, 10 s."""
 
     @pytest.fixture(scope="class")
     @classmethod
     def run(cls) -> Trajectory:
-        system = System(
-            "pendulum",
-            bodies=[PointMass(name="bob", mass=1.0, position=(-1.0, 0.0, 0.0))],
-            constraints=[
-                Distance(name="rod", body_j="bob"),
-                PlaneGuide(name="plane", body_j="bob", normal_i=(0, 0, 1)),
-            ],
-            forces=[DOWN],
-        )
-        return simulate(system, 10.0, TIGHT).check()
+        return simulate(pendulum(), 10.0, TIGHT).check()
 
     def test_positions_and_velocities(self, run):
-        rows = np.array(_problem("iftomm_A01_simple_pendulum")["reference"]["iftomm_rows"])
+        rows = PENDULUM_ROWS
         states = run.at(rows[:, 0])
         # The benchmark suggests 1e-4 m at a tolerance of 1e-6.
         np.testing.assert_allclose(states.q[:, :2], rows[:, 1:3], atol=4e-5)
@@ -78,11 +82,10 @@ def _vertical(*bodies: PointMass) -> list[LineGuide]:
     return [LineGuide(name=f"rail of {b.name}", body_j=b.name, axis_i=(0, 1, 0), point_i=b.position) for b in bodies]
 
 
-def _atwood(bodies, path) -> Trajectory:
+def _atwood(bodies, path) -> System:
     rope = RopeLength(name="rope", path=path)
     sensor = RopeSensor(name="cell", rope="rope", components=("tension",))
-    system = System("atwood", bodies=bodies, constraints=[*_vertical(*bodies), rope], forces=[DOWN], sensors=[sensor])
-    return simulate(system, 0.5).check()
+    return System("atwood", bodies=bodies, constraints=[*_vertical(*bodies), rope], forces=[DOWN], sensors=[sensor])
 
 
 def _assert_uniform(run: Trajectory, name: str, acceleration: float, tension: float) -> None:
@@ -92,20 +95,26 @@ def _assert_uniform(run: Trajectory, name: str, acceleration: float, tension: fl
     np.testing.assert_allclose(run.sensors()["cell"], tension, atol=1e-6)
 
 
-def test_atwood_with_a_massless_pulley():
-    facts = _problem("atwood_pulley")["reference"]["b_massless"]
+ATWOOD = _problem("atwood_pulley")["reference"]
+
+
+def over_a_pulley() -> System:
+    """2 kg and 3 kg."""
     light, heavy = (
         PointMass(name=n, mass=m, position=(x, -1.0, 0.0)) for n, m, x in (("m1", 2.0, 0.0), ("m2", 3.0, 0.2))
     )
     path = _rope(("m1", (0, 0, 0)), ("ground", (0, 0, 0)), ("ground", (0.2, 0, 0)), ("m2", (0, 0, 0)))
-    run = _atwood((light, heavy), path)
+    return _atwood((light, heavy), path)
+
+
+def test_atwood_with_a_massless_pulley():
+    facts, run = ATWOOD["b_massless"], simulate(over_a_pulley(), 0.5).check()
     _assert_uniform(run, "m2", -facts["acceleration"], facts["tension"])
     _assert_uniform(run, "m1", facts["acceleration"], facts["tension"])
 
 
-def test_atwood_with_a_movable_pulley():
+def over_a_movable_pulley() -> System:
     """The rope runs from the ground down to the load and up again, then over a fixed pulley to the free end."""
-    facts = _problem("atwood_pulley")["reference"]["c_movable"]
     load, free = (
         PointMass(name="load", mass=3.0, position=(0, -1.0, 0)),
         PointMass(name="free", mass=1.0, position=(0.3, -1.0, 0)),
@@ -113,7 +122,11 @@ def test_atwood_with_a_movable_pulley():
     path = _rope(
         ("ground", (0, 0, 0)), ("load", (0, 0, 0)), ("ground", (0, 0, 0)), ("ground", (0.3, 0, 0)), ("free", (0, 0, 0))
     )
-    run = _atwood((load, free), path)
+    return _atwood((load, free), path)
+
+
+def test_atwood_with_a_movable_pulley():
+    facts, run = ATWOOD["c_movable"], simulate(over_a_movable_pulley(), 0.5).check()
     _assert_uniform(run, "free", -facts["acceleration_m_down"], facts["tension"])
     _assert_uniform(run, "load", facts["acceleration_M_up"], facts["tension"])
 
@@ -122,7 +135,7 @@ SPRING = _problem("spring_mass")
 RESONANT = Input(name="drive", signal=Harmonic(amplitude=4.0, frequency=5.0 / (2.0 * np.pi), phase=np.pi / 2))
 
 
-def _oscillator(damping: float, x: float, v: float, driven: bool) -> System:
+def oscillator(damping: float, x: float, v: float, driven: bool) -> System:
     """2 kg on 50 N/m along x; x is the way from the rest position, 1 m from the wall."""
     force = LumpedLoad(name="force", body="mass", force=(1.0, 0.0, 0.0), input="drive")
     spring = SpringDamper(name="spring", body_j="mass", stiffness=50.0, damping=damping, free_length=1.0)
@@ -139,13 +152,17 @@ CASES = {"free": (0.0, False), "under": (2.0, False), "critical": (20.0, False),
          "resonance": (1.0, True), "undamped_resonance": (0.0, True)}  # fmt: skip
 
 
+def oscillating(case: str) -> tuple[System, np.ndarray]:
+    """A case, and its t, x (and v)."""
+    damping, driven = CASES[case]
+    x, v = (0.0, 0.0) if driven else (0.1, 0.3)
+    return oscillator(damping, x, v, driven), np.array(SPRING["reference"][case])
+
+
 @pytest.mark.filterwarnings("ignore:.*read by no element")
 @pytest.mark.parametrize("case", CASES)
 def test_spring_and_mass(case):
-    damping, driven = CASES[case]
-    rows = np.array(SPRING["reference"][case])
-    x, v = (0.0, 0.0) if driven else (0.1, 0.3)
-    system = _oscillator(damping, x, v, driven)
+    system, rows = oscillating(case)
     states = simulate(system, rows[-1, 0], TIGHT).check().at(rows[:, 0])
     # A second-order method at rtol = 1e-8: 4e-6 m of phase error were seen; the undamped resonance grows without end.
     scale = max(1.0, np.abs(rows[:, 1]).max())

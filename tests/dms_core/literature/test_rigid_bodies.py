@@ -89,35 +89,48 @@ def _steady(t):
     return OMEGA * t, OMEGA, 0.0
 
 
+def four_bar() -> System:
+    """A crank driven at constant speed."""
+    phi, psi = _coupler_angle(0.0), _rocker_angle(0.0)
+    return System(
+        "four-bar",
+        bodies=[
+            _link("crank", CRANK, (0.0, 0.0), 0.0),
+            _link("coupler", COUPLER, (CRANK, 0.0), phi),
+            _link("rocker", ROCKER, (BASE, 0.0), psi),
+        ],
+        constraints=[
+            Revolute(name="a", body_j="crank"),
+            Revolute(name="b", body_i="crank", body_j="coupler", point_i=(CRANK, 0, 0), point_j=(0, 0, 0)),
+            Revolute(name="c", body_i="coupler", body_j="rocker", point_i=(COUPLER, 0, 0), point_j=(ROCKER, 0, 0)),
+            Revolute(name="d", body_j="rocker", point_i=(BASE, 0, 0), point_j=(0, 0, 0)),
+            AngleDriver(name="motor", joint="a", input="turn"),
+        ],
+        sensors=[
+            Point(name="pin", body="rocker", point=(ROCKER, 0, 0)),
+            JointAngle(name="rocker_angle", joint="d"),
+            JointReaction(name="drive", constraint="motor", body="crank"),
+        ],
+        inputs=[Input(name="turn", signal=Function(function=_steady))],
+    )
+
+
+def coupler_end(times: np.ndarray) -> np.ndarray:
+    """Where the loop equation has the pin between coupler and rocker [m], shape (k, 2)."""
+    theta = OMEGA * times
+    phi = np.array([_coupler_angle(x) for x in theta])
+    return np.column_stack(
+        [CRANK * np.cos(theta) + COUPLER * np.cos(phi), CRANK * np.sin(theta) + COUPLER * np.sin(phi)]
+    )
+
+
 class TestFourBar:
     """A crank driven at constant speed; four hinges in space make three rows redundant."""
 
     @pytest.fixture(scope="class")
     @classmethod
     def run(cls) -> Trajectory:
-        phi, psi = _coupler_angle(0.0), _rocker_angle(0.0)
-        system = System(
-            "four-bar",
-            bodies=[
-                _link("crank", CRANK, (0.0, 0.0), 0.0),
-                _link("coupler", COUPLER, (CRANK, 0.0), phi),
-                _link("rocker", ROCKER, (BASE, 0.0), psi),
-            ],
-            constraints=[
-                Revolute(name="a", body_j="crank"),
-                Revolute(name="b", body_i="crank", body_j="coupler", point_i=(CRANK, 0, 0), point_j=(0, 0, 0)),
-                Revolute(name="c", body_i="coupler", body_j="rocker", point_i=(COUPLER, 0, 0), point_j=(ROCKER, 0, 0)),
-                Revolute(name="d", body_j="rocker", point_i=(BASE, 0, 0), point_j=(0, 0, 0)),
-                AngleDriver(name="motor", joint="a", input="turn"),
-            ],
-            sensors=[
-                Point(name="pin", body="rocker", point=(ROCKER, 0, 0)),
-                JointAngle(name="rocker_angle", joint="d"),
-                JointReaction(name="drive", constraint="motor", body="crank"),
-            ],
-            inputs=[Input(name="turn", signal=Function(function=_steady))],
-        )
-        return simulate(system, 2.0, SolverOptions(rtol=1e-7)).check()
+        return simulate(four_bar(), 2.0, SolverOptions(rtol=1e-7)).check()
 
     def test_redundant_rows(self, run):
         assert run.model.degrees_of_freedom == 0
@@ -125,11 +138,10 @@ class TestFourBar:
         assert all(row.split(".")[1] in ("z", "tilt_f", "tilt_g") for row in run.model.redundant_rows)
 
     def test_coupler_obeys_the_loop_equation(self, run):
-        y, theta = run.sensors(), OMEGA * run.t
-        phi = np.array([_coupler_angle(x) for x in theta])
+        y = run.sensors()
+        found = np.column_stack([y["pin.position.x"], y["pin.position.y"]])
         # The motion is kinematic: every step solves the loop to the constraint tolerance, 1e-10.
-        np.testing.assert_allclose(y["pin.position.x"], CRANK * np.cos(theta) + COUPLER * np.cos(phi), atol=1e-9)
-        np.testing.assert_allclose(y["pin.position.y"], CRANK * np.sin(theta) + COUPLER * np.sin(phi), atol=1e-9)
+        np.testing.assert_allclose(found, coupler_end(run.t), atol=1e-9)
 
     def test_rocker_rates_and_accelerations(self, run):
         times = np.linspace(0.1, 1.9, 37)
@@ -160,9 +172,13 @@ def _kinetic(model: Model, q: np.ndarray, v: np.ndarray) -> float:
     return total
 
 
-def _top(inertia, omega) -> Trajectory:
-    """A free body that starts with `omega` [rad/s] in its own axes, at a general orientation."""
-    p = quaternion((1.0, 2.0, -0.5), 0.9)
+TILTED = quaternion((1.0, 2.0, -0.5), 0.9)
+"""Orientation of the free bodies at the start."""
+
+
+def free_body(inertia, omega) -> System:
+    """A body that starts with `omega` [rad/s] in its own axes, at a general orientation."""
+    p = TILTED
     body = RigidBody(
         name="top",
         mass=1.3,
@@ -171,10 +187,14 @@ def _top(inertia, omega) -> Trajectory:
         velocity=(0.1, 0.2, 0.3),
         angular_velocity=tuple(rotation_matrix(p) @ np.array(omega)),
     )
-    return simulate(System("top", bodies=[body]), 3.0, TIGHT).check()
+    return System("top", bodies=[body])
 
 
 TIGHT = SolverOptions(rtol=1e-8)
+
+
+def _top(inertia, omega) -> Trajectory:
+    return simulate(free_body(inertia, omega), 3.0, TIGHT).check()
 
 
 def _spin(run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -212,10 +232,12 @@ def test_symmetric_top_precesses_as_in_closed_form():
     np.testing.assert_allclose(A[:, :, 2], np.array(turn) @ A[0][:, 2], atol=3e-5)
 
 
-def test_driven_joint_follows_its_input_and_shows_its_moment():
-    """M = I thetaddot + m g l cos(theta) for a rod that swings as a sine; angle, rate and acceleration as given."""
-    amplitude, frequency, offset = 0.8, 0.9, 0.3
-    system = System(
+AMPLITUDE, FREQUENCY, OFFSET = 0.8, 0.9, 0.3
+
+
+def driven_rod() -> System:
+    """It swings as a sine."""
+    return System(
         "driven rod",
         bodies=[
             RigidBody(
@@ -226,14 +248,18 @@ def test_driven_joint_follows_its_input_and_shows_its_moment():
         constraints=[Revolute(name="hinge", body_j="rod"), AngleDriver(name="motor", joint="hinge", input="angle")],
         forces=[Gravity(name="gravity", acceleration=(0.0, -9.81, 0.0))],
         sensors=[JointAngle(name="theta", joint="hinge"), JointReaction(name="drive", constraint="motor", body="rod")],
-        inputs=[Input(name="angle", signal=Harmonic(amplitude=amplitude, frequency=frequency, offset=offset))],
+        inputs=[Input(name="angle", signal=Harmonic(amplitude=AMPLITUDE, frequency=FREQUENCY, offset=OFFSET))],
     )  # fmt: skip
-    run = simulate(system, 2.0, SolverOptions(rtol=1e-7)).check()
-    y, x = run.sensors(), 2.0 * np.pi * frequency * run.t
-    rate = 2.0 * np.pi * frequency
-    theta, second = offset + amplitude * np.sin(x), -amplitude * rate**2 * np.sin(x)
+
+
+def test_driven_joint_follows_its_input_and_shows_its_moment():
+    """M = I thetaddot + m g l cos(theta) for a rod that swings as a sine; angle, rate and acceleration as given."""
+    run = simulate(driven_rod(), 2.0, SolverOptions(rtol=1e-7)).check()
+    y, x = run.sensors(), 2.0 * np.pi * FREQUENCY * run.t
+    rate = 2.0 * np.pi * FREQUENCY
+    theta, second = OFFSET + AMPLITUDE * np.sin(x), -AMPLITUDE * rate**2 * np.sin(x)
     np.testing.assert_allclose(y["theta.angle"], theta, atol=1e-9)
-    np.testing.assert_allclose(y["theta.rate"], amplitude * rate * np.cos(x), atol=1e-9)
+    np.testing.assert_allclose(y["theta.rate"], AMPLITUDE * rate * np.cos(x), atol=1e-9)
     # Accelerations are differences of velocities over a step: of order two in steps of 2e-4 s.
     np.testing.assert_allclose(y["theta.acceleration"], second, atol=2e-4)
     np.testing.assert_allclose(y["drive.Mz"], 2.0 / 3.0 * second + 9.81 * np.cos(theta), atol=2e-4)

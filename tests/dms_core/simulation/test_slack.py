@@ -80,6 +80,27 @@ def test_it_goes_slack_where_the_swing_is_too_slow():
     assert later.coordinate("mass.y")[0] - at.coordinate("mass.y")[0] == pytest.approx(0.1 * vy - 0.005 * G, abs=1e-7)
 
 
+def test_between_the_long_steps_of_radau_it_is_as_good_as_on_them():
+    """Some sixty steps, ten times as long as a cubic is good for: length, and tension m (v^2 - g h) / L."""
+    y0 = 0.45
+    x0 = math.sqrt(LENGTH**2 - y0**2)
+    run = simulate(swing((x0, y0, 0.0)), 0.8, SolverOptions(rtol=1e-9, method="radau5")).check()
+    assert len(run.t) < 100
+    taut, t = math.sqrt(4.0 * y0 / G), np.linspace(0.0, 0.8, 401)
+    at, tension = run.at(t), run.sensors(t)["cell.tension"]
+    x, h = at.coordinate("mass.x"), at.coordinate("mass.y")
+    before, behind = t < taut, t > taut
+    assert np.abs(h[before] - (y0 - 0.5 * G * t[before] ** 2)).max() < 1e-12
+    assert np.all(tension[before] == 0.0) and np.abs(at.a[before] - [0.0, -G, 0.0]).max() < 1e-12
+    # A cubic errs by 1.7e-8 m, and linear multipliers by 1e-2 N.
+    assert np.abs(np.hypot(x, h)[behind] - LENGTH).max() < 1e-9
+    speed2 = at.rate("mass.x") ** 2 + at.rate("mass.y") ** 2
+    assert tension[behind] == pytest.approx((2.0 * (speed2 - G * h) / LENGTH)[behind], abs=1e-7)
+    # At the event itself the values are those before it.
+    event = run.t[1:][np.diff(run.t) == 0.0][-1]
+    assert run.sensors([event])["cell.tension"][0] == 0.0
+
+
 def test_a_bilateral_rope_pushes_and_is_flagged():
     run = simulate(swing((0.6, 0.45, 0.0), unilateral=False), 1.0, SolverOptions(rtol=1e-6)).check()
     assert [f.element for f in run.flags] == ["rope"] and run.flags[0].worst < -5.0

@@ -27,6 +27,7 @@ from dms_core.model import (
     System,
 )
 from dms_core.simulation.dynamics import Simulation, SolverOptions, World
+from dms_core.simulation.events import Crossing
 from dms_core.simulation.snapshot import GLOBAL_WORK, held_arrays
 from tests.dms_core.assembly.specimen import specimen
 
@@ -269,3 +270,42 @@ def test_a_damaged_snapshot_is_refused_before_anything_is_written(hanging, damag
     with pytest.raises(InputError, match=complaint):
         world.restore(damaged(past))
     assert [x.tobytes() for x in held_arrays(world.state)] == before
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_world_that_stands_on_an_event_does_so_when_it_is_put_back(hanging, method):
+    """It passes the same value again only after it has left it, as the world it was taken of."""
+    event, options = Crossing("angle.angle", way=0, value=0.02), SolverOptions(rtol=1e-6, method=method)
+    world = World(hanging, options)
+    world.advance(0.7, stop_at=event)
+    assert world.crossing == event
+    past = pickle.loads(pickle.dumps(world.snapshot()))
+    assert past == world.snapshot() and past.ending.crossing == event
+    here = world.mark()
+    world.advance(2.0, stop_at=event)
+    wanted = world.time, world.crossing, world.state.q.tobytes()
+    assert world.time > 0.0 and wanted[0] > past.time
+    other = World(hanging, options)
+    other.restore(past)
+    assert (other.crossing, other.crossed_at, other.message) == (event, past.time, past_message(event))
+    other.advance(2.0, stop_at=event)
+    assert (other.time, other.crossing, other.state.q.tobytes()) == wanted
+    world.rewind(here)
+    assert world.crossing == event
+    world.advance(2.0, stop_at=event)
+    assert (world.time, world.crossing, world.state.q.tobytes()) == wanted
+
+
+def past_message(event: Crossing) -> str:
+    return f"The run ended where '{event.sensor}' passed {event.value:g}."
+
+
+def test_a_world_that_was_put_back_stands_on_no_event_of_its_own(hanging):
+    """The event of the world that is overwritten is gone with it."""
+    event = Crossing("angle.angle", way=0, value=0.02)
+    world = World(hanging)
+    start = world.snapshot()
+    world.advance(0.7, stop_at=event)
+    assert world.crossing == event
+    world.restore(start)
+    assert world.crossing is None and world.crossed_at == -np.inf

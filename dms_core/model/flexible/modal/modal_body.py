@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,6 +12,7 @@ from dms_core.errors import ModelError
 from dms_core.model.element import Composition, Parts, Quaternion, Vector
 from dms_core.model.flexible.modal.floating_frame import FloatingFrame, modes_of
 from dms_core.model.flexible.modal.interface_frame import InterfaceFrame
+from dms_core.model.flexible.modal.load_distribution import LoadDistribution
 from dms_core.model.flexible.modal.modal_data import ModalData, nested
 from dms_core.model.flexible.modal.modal_node import ModalNode
 from dms_core.model.geometry.frames import euler_rates, rotation_matrix
@@ -41,6 +42,9 @@ class ModalBody(Composition):
     kind: ClassVar[str] = "modal_body"
     data: ModalData = Field(description="invariants of mass, stiffness and modes")
     interfaces: tuple[Interface, ...] = Field(default=(), description="nodes to which something attaches")
+    distributions: tuple[LoadDistribution, ...] = Field(
+        default=(), description="its length or its volume, for loads by these; its mass is in `data`"
+    )
     damping_ratio: float = Field(default=0.0, ge=0.0, description="of each mode, for itself [-]")
     position: Vector = Field(default=(0.0, 0.0, 0.0), description="origin of the floating frame at the start [m]")
     orientation: Quaternion = Field(
@@ -60,6 +64,15 @@ class ModalBody(Composition):
                         f"interface '{node.name}': {what}: Expected {self.data.size} items, as many as modes, got "
                         f"{len(getattr(node, what))}"
                     )
+        for one in self.distributions:
+            if len(one.translation) != self.data.size:
+                raise ValueError(
+                    f"distributions: {one.measure}: translation: Expected {self.data.size} items, as many as modes, "
+                    f"got {len(one.translation)}"
+                )
+        measures = [one.measure for one in self.distributions]
+        if len(set(measures)) < len(measures):
+            raise ValueError(f"distributions: Expected each measure once, got {', '.join(measures)}")
         return self
 
     @property
@@ -102,7 +115,8 @@ class ModalBody(Composition):
     @classmethod
     def of(
         cls, name: str, nodes: np.ndarray, mass: np.ndarray, stiffness: np.ndarray, modes: np.ndarray,
-        interfaces: Mapping[str, int] | None = None, **settings: Any,
+        interfaces: Mapping[str, int] | None = None,
+        loads: Mapping[Literal["length", "volume"], np.ndarray] | None = None, **settings: Any,
     ) -> ModalBody:  # fmt: skip
         """The modal body of a finite-element model.
 
@@ -113,10 +127,13 @@ class ModalBody(Composition):
             stiffness: K, shape (d, d).
             modes: Phi, shape (d, n), orthogonal in both and free of rigid motions, as `craig_bampton` gives them.
             interfaces: number of the node for each name of an interface.
+            loads: nodal loads of 1 per length or volume along x, y and z, shape (d, 3), for each of these measures
+                that a `distributed_load` uses; their intensity need not be the same everywhere.
             settings: further keys of the class.
 
         Raises:
-            ModelError: see ModalData.of; or an interface names no node, or one without rotations.
+            ModelError: see ModalData.of and LoadDistribution.of; or an interface names no node, or one without
+                rotations.
         """
         who, data = f"modal_body '{name}'", ModalData.of(nodes, mass, stiffness, modes)
         x, per = np.asarray(nodes, float), len(modes) // len(nodes)
@@ -136,4 +153,5 @@ class ModalBody(Composition):
                     rotations=nested(shapes[:, 3:], np.abs(shapes[:, 3:]).max()),
                 )
             )  # fmt: skip
-        return cls(name=name, data=data, interfaces=tuple(found), **settings)
+        spread = tuple(LoadDistribution.of(key, x, modes, B) for key, B in (loads or {}).items())
+        return cls(name=name, data=data, interfaces=tuple(found), distributions=spread, **settings)

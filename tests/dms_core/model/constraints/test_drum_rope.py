@@ -21,13 +21,14 @@ from dms_core.model import (
     Slider,
     System,
 )
-from tests.dms_core.model.constraints.wheels import NEAR, axle, run, torque, turned, wheel
+from dms_core.simulation.options import SolverOptions
+from tests.dms_core.model.constraints.wheels import NEAR, TIGHT, axle, run, torque, turned, wheel
 
 
 class TestDrumRope:
     M1, M2, J, R = 3.0, 1.0, 0.04, 0.1
 
-    def atwood(self, time: float = 1.0, **changes):
+    def atwood(self, time: float = 1.0, options: SolverOptions = TIGHT, **changes):
         """Atwood's machine, its pulley a drum with inertia: one rope is paid out as the other is taken up."""
         drum = wheel("drum", self.J)
         left = PointMass(name="left", mass=self.M1, position=(-self.R, -1.0, 0.0))
@@ -42,6 +43,7 @@ class TestDrumRope:
         ]  # fmt: skip
         return run(
             time,
+            options=options,
             bodies=[drum, left, right],
             constraints=[axle(drum), *ropes],
             forces=[Gravity(name="weight", acceleration=(0.0, -9.81, 0.0))],

@@ -12,18 +12,25 @@ from scipy.linalg import expm
 from dms_core.assembly.model import Model
 from dms_core.errors import ModelError
 from dms_core.model import (
+    Beam,
+    BeamLoad,
+    BeamSection,
     Constant,
     CoordinateSensor,
     DcMotor,
+    ElasticRope,
+    Fixed,
     Gravity,
     Input,
     JointAngle,
     JointMoment,
     LumpedLoad,
+    PathPoint,
     Point,
     PointMass,
     Revolute,
     RigidBody,
+    RopeSensor,
     SensorPid,
     Steps,
     System,
@@ -208,6 +215,48 @@ def test_any_sensor_may_be_controlled():
     t = np.linspace(0.0, 2.0, 41)
     exact = np.array([rest - expm(A * x) @ rest for x in t])
     assert np.abs(run.sensors(t)["at.position.y"] - exact[:, 1]).max() < 2e-5
+
+
+def test_a_force_is_controlled_through_a_rope_that_measures_it():
+    """m sdd = F - T, T = k s + c sd, F = kp (T* - T) + I, Idot = ki (T* - T): what a joint's reaction cannot do."""
+    m, stiffness, damping, free, kp, ki, wanted = 2.0, 400.0, 40.0, 0.8, 1.5, 30.0, 25.0
+    k, c = stiffness / free, damping / free
+    mass = PointMass(name="mass", mass=m, position=(free + 0.02, 0.0, 0.0))
+    path = (PathPoint(point=(0.0, 0.0, 0.0)), PathPoint(body="mass", point=(0.0, 0.0, 0.0)))
+    rope = ElasticRope(name="rope", path=path, axial_stiffness=stiffness, damping=damping, free_length=free)
+    pull = LumpedLoad(name="pull", body="mass", force=(1.0, 0.0, 0.0), input="force")
+    loop = SensorPid(name="loop", sensor="cell", output="force", kp=kp, ki=ki, setpoint=wanted)
+    system = System(
+        "force control", bodies=[mass], forces=[rope, pull, loop], inputs=[Input(name="force")],
+        sensors=[RopeSensor(name="cell", rope="rope", components=("tension",))],
+    )  # fmt: skip
+    run = simulate(system, 2.0, RTOL).check()
+    T = np.array([0.0, k, c])
+    A = np.array([-ki * T, [0.0, 0.0, 1.0], (np.array([1.0, 0.0, 0.0]) - (1.0 + kp) * T) / m])
+    rest = np.linalg.solve(-A, [ki * wanted, 0.0, kp * wanted / m])
+    t = np.linspace(0.0, 2.0, 81)
+    exact = np.array([rest + expm(A * x) @ ([0.0, 0.02, 0.0] - rest) for x in t])
+    assert exact[:, 1].min() > 0.0
+    assert np.abs(run.sensors(t)["cell"] - exact @ T).max() < 1e-3
+    assert run.sensors(t[-1:])["cell"][0] == pytest.approx(wanted, rel=1e-3)
+
+
+def test_a_beam_is_a_load_cell():
+    """The pull in a clamped beam is led to its set-point by the force at its tip: 1 - exp(-ki t) of it."""
+    section = BeamSection.rectangle(0.01, 0.01, 2e9, 0.3, 1000.0)
+    beam = Beam(name="cell", section=section, length=0.2, elements=2, damping_time=1e-3)
+    system = System(
+        "cell", compositions=[beam], constraints=[Fixed(name="clamp", body_j=beam.node(0))],
+        forces=[
+            LumpedLoad(name="pull", body=beam.node(-1), force=(1.0, 0.0, 0.0), input="force"),
+            SensorPid(name="loop", sensor="gauge.N", output="force", ki=40.0, setpoint=5.0, nominal_reading=10.0),
+        ],
+        sensors=[BeamLoad(name="gauge", element="cell.element0")], inputs=[Input(name="force")],
+    )  # fmt: skip
+    run = simulate(system, 0.2, SolverOptions(rtol=1e-6)).check()
+    t = np.linspace(0.02, 0.2, 10)
+    # The beam answers within its longest period of 1 ms, 4 % of the controller's time.
+    assert run.sensors(t)["gauge.N"] == pytest.approx(5.0 * (1.0 - np.exp(-40.0 * t)), abs=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -45,3 +45,22 @@ def linear_beam(section: BeamSection, length: float, elements: int, start: float
     nodes = np.zeros((k, 3))
     nodes[:, 0] = start + h * np.arange(k)
     return LinearBeam(nodes, M, K)
+
+
+def loads_per_length(beam: LinearBeam, near: float = 1.0, far: float = 1.0) -> np.ndarray:
+    """Nodal loads of an intensity from `near` to `far` along x, y and z, shape (6 k, 3): what does the cubic's work.
+
+    An element of the length h from q_i to q_j has the forces h (7 q_i + 3 q_j) / 20 and h (3 q_i + 7 q_j) / 20, and the
+    moments h^2 (3 q_i + 2 q_j) / 60 and -h^2 (2 q_i + 3 q_j) / 60; along it h (2 q_i + q_j) / 6.
+    """
+    x, B = beam.nodes[:, 0], np.zeros((len(beam.mass), 3))
+    share = near + (far - near) * (x - x[0]) / (x[-1] - x[0])
+    for e, h in enumerate(np.diff(x)):
+        i, j, o = share[e], share[e + 1], 6 * e
+        B[[o, o + 6], 0] += h * np.array([2.0 * i + j, i + 2.0 * j]) / 6.0
+        forces = h * np.array([7.0 * i + 3.0 * j, 3.0 * i + 7.0 * j]) / 20.0
+        moments = h * h * np.array([3.0 * i + 2.0 * j, -2.0 * i - 3.0 * j]) / 60.0
+        for across, turn, sign in ((1, 5, 1.0), (2, 4, -1.0)):
+            B[[o + across, o + 6 + across], across] += forces
+            B[[o + turn, o + 6 + turn], across] += sign * moments
+    return B

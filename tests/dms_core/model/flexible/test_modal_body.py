@@ -29,7 +29,7 @@ from dms_core.model_files.model_file import dump, load
 from dms_core.simulation.dynamics import SolverOptions, simulate
 from tests.dms_core.model.flexible.beams import EI, SLENDER
 from tests.dms_core.model.flexible.equilibrium import at_rest, equilibrium, frequencies, place
-from tests.dms_core.model.flexible.linear_beam import linear_beam
+from tests.dms_core.model.flexible.linear_beam import linear_beam, loads_per_length
 
 ELEMENTS = 10
 FE = linear_beam(SLENDER, 1.0, ELEMENTS)
@@ -182,7 +182,8 @@ def test_a_rigid_motion_is_that_of_a_rigid_body():
 def test_model_file(tmp_path):
     """Invariants are written out in full and read again."""
     path = tmp_path / "link.yaml"
-    system = System(compositions=[link(0)], constraints=[Fixed(name="clamp", body_j="link.root")])
+    body = link(0, loads={"length": loads_per_length(FE)})
+    system = System(compositions=[body], constraints=[Fixed(name="clamp", body_j="link.root")])
     path.write_text(dump(system))
     assert list(load(path).everything()) == list(system.everything())
 
@@ -254,7 +255,7 @@ def changed(**changes):
                     compositions=[link(0)], forces=[DistributedLoad(name="x", body="link", per_length=(1.0, 0.0, 0.0))]
                 )
             ),
-            "Expected per_mass without start, end and end_factor for the modal body 'link'",
+            "Expected per_mass, or a modal body with a distribution of its length, got 'link' with none: ",
         ),
     ],
 )

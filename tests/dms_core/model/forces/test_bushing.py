@@ -5,22 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
+from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
+from dms_core.analyses import static_equilibrium
 from dms_core.assembly.model import Model
 from dms_core.errors import ModelError
 from dms_core.model import (
     Bushing,
     BushingCurves,
+    BushingLoad,
     CoordinateSensor,
     ForceLoad,
     Gravity,
+    Input,
     LoadCurve,
+    LumpedLoad,
     PointMass,
     RigidBody,
+    SensorPid,
     System,
 )
-from dms_core.model.geometry.frames import quaternion, quaternion_product, rotation_matrix
+from dms_core.model.geometry.frames import g_matrix, quaternion, quaternion_product, rotation_matrix
 from dms_core.simulation.dynamics import SolverOptions, simulate
 from tests.dms_core.model.poses import random_motion, start
 from tests.example_elements import Example
@@ -211,6 +217,56 @@ def test_what_is_not_given_is_undeformed_at_the_start():
     given = Bushing(name="cushion", body_i="upper", body_j="lower", stiffness=STIFFNESS)
     call = kernel_calls(Example(cushion().system, given))[0]
     np.testing.assert_allclose(call(start(call), 0)[0], 0.0, atol=1e-12)
+
+
+def test_its_sensor_tells_what_it_does():
+    """Forces in the axes of its frame, which are the ground's: those of a force_load, the other way; and the law."""
+    damping = (3.0, 2.0, 4.0, 0.2, 0.1, 0.3)
+    body = block(
+        position=(0.03, -0.02, 0.05), velocity=(0.4, 0.1, -0.2), orientation=tuple(quaternion((0.3, 0.2, 0.9), 0.4)),
+        angular_velocity=(0.5, -1.0, 2.0),
+    )  # fmt: skip
+    sensors = BushingLoad(name="gauge", bushing="cushion"), ForceLoad(name="load", force="cushion", body="block")
+    run = simulate(held(body, *sensors, damping=damping), 0.3, SolverOptions(rtol=1e-6)).check()
+    y = run.sensors(run.t)
+    for k, axis in enumerate("xyz"):
+        law = STIFFNESS[k] * run.q[:, k] + damping[k] * run.v[:, k]
+        np.testing.assert_allclose(y[f"gauge.F{axis}"], law, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(y[f"load.F{axis}"], -y[f"gauge.F{axis}"], rtol=1e-12, atol=1e-12)
+    # The rotation vector, and its rate by differences of the attitude a step on.
+    turn = Rotation.from_quat(run.q[:, [4, 5, 6, 3]])
+    w = 2.0 * np.array([g_matrix(p) @ pd for p, pd in zip(run.q[:, 3:], run.v[:, 3:], strict=True)])
+    h = 1e-6
+    far, near = ((turn * Rotation.from_rotvec(sign * h * w)).as_rotvec() for sign in (1.0, -1.0))
+    for k, axis in enumerate("xyz"):
+        law = STIFFNESS[3 + k] * turn.as_rotvec()[:, k] + damping[3 + k] * (far - near)[:, k] / (2.0 * h)
+        np.testing.assert_allclose(y[f"gauge.M{axis}"], law, atol=1e-8)
+
+
+def test_a_controller_holds_its_load():
+    """The force of a bushing is led to its set-point by a force on the block: m sdd = F - T, T = k s + c sd."""
+    m, k, c, kp, ki, wanted = MASS, 300.0, 12.0, 1.5, 30.0, 25.0
+    loop = SensorPid(name="loop", sensor="gauge.Fy", output="force", kp=kp, ki=ki, setpoint=wanted)
+    pull = LumpedLoad(name="pull", body="block", force=(0.0, 1.0, 0.0), input="force")
+    cushion_to_block = Bushing(
+        name="cushion",
+        body_j="block",
+        point_j=(0.0, 0.0, 0.0),
+        stiffness=STIFFNESS,
+        damping=(9.0, c, 9.0, 1.0, 1.0, 1.0),
+    )
+    system = System(
+        bodies=[block()], forces=[cushion_to_block, pull, loop], inputs=[Input(name="force")],
+        sensors=[BushingLoad(name="gauge", bushing="cushion")],
+    )  # fmt: skip
+    run = simulate(system, 1.5, SolverOptions(rtol=1e-8)).check()
+    T = np.array([0.0, k, c])
+    A = np.array([-ki * T, [0.0, 0.0, 1.0], (np.array([1.0, 0.0, 0.0]) - (1.0 + kp) * T) / m])
+    rest = np.linalg.solve(-A, [ki * wanted, 0.0, kp * wanted / m])
+    t = np.linspace(0.0, 1.5, 61)
+    exact = np.array([T @ (rest - expm(A * x) @ rest) for x in t])
+    assert np.abs(run.sensors(t)["gauge.Fy"] - exact).max() < 1e-3
+    assert static_equilibrium(system).states().sensors()["gauge.Fy"][-1] == pytest.approx(wanted, rel=1e-10)
 
 
 CURVE = LoadCurve(deflections=(-1.0, 0.0, 1.0), loads=(-1.0, 0.0, 2.0))
