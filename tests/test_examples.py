@@ -55,6 +55,10 @@ CHECKS = {
     "pid_tuning": lambda said: falling(numbers(said, r"rms error (\S+) deg")),
     # A tenth of the first loss, by far.
     "swing_by_gradient": lambda said: numbers(said, r"(\d\S+\d)")[1] < 0.1 * numbers(said, r"(\d\S+\d)")[0],
+    # Both ways learn something within seconds, on the patients that they train with.
+    "assist_by_gradient": lambda said: all(
+        x < 0.8 * numbers(said, r"assistance: cost (\S+)")[0] for x in numbers(said, r"^ +\d+\.\d s +\d+ +(\S+)")[-1:]
+    ),
     "sb3_training": lambda said: len(numbers(said, r"20 episodes: (\S+)")) == 1,
 }
 
@@ -68,7 +72,7 @@ def test_every_script_is_listed_and_run():
 
 @pytest.mark.parametrize("name", list(CHECKS))
 def test_the_answer_is_right(name):
-    if name == "sb3_training":
+    if name in ("sb3_training", "assist_by_gradient"):
         pytest.importorskip("stable_baselines3")
     if name == "swing_by_gradient":
         pytest.importorskip("torch")

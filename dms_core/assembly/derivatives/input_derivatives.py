@@ -212,9 +212,12 @@ class InputDerivatives:
     def _moment(self, sensor: Call, call: Call, e: int, q: np.ndarray) -> np.ndarray:
         """Moment about the sensor's axis of the columns of Ju on its distal bodies, shape (k, 3)."""
         base, numbers = q[sensor.iq[:7]], np.array(sensor.placement.numbers)
+        Ju, total = self._of_call(e), np.zeros((len(call.iu), 3))
+        if not Ju[: 7 * len(call.placement.bodies)].any():
+            # The input of a muscle moves its activation, and no body at once.
+            return total
         centre = base[:3] + _turned(base[3:], numbers[MOMENT.centre : MOMENT.centre + 3])
         axis = _turned(base[3:], numbers[MOMENT.axis : MOMENT.axis + 3])
-        Ju, total = self._of_call(e), np.zeros((len(call.iu), 3))
         for o in range(0, 7 * len(call.placement.bodies), 7):
             if call.iq[o] in sensor.iq[7::7]:
                 own, load = q[call.iq[o : o + 7]], np.moveaxis(Ju[o : o + 7], 0, -1)

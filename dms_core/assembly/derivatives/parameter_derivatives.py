@@ -287,6 +287,22 @@ def declared_number(system: System, name: str, path: str) -> float:
     return _number(f"{element.kind} '{name}'", element, path.split("."))
 
 
+def system_with(system: System, values: Mapping[tuple[str, str], float]) -> System:
+    """The system with other values of declared numbers.
+
+    Args:
+        system: the declared system.
+        values: by name of the element and path of the number.
+
+    Raises:
+        InputError: there is no such number.
+    """
+    for (name, path), value in values.items():
+        change = value - declared_number(system, name, path)
+        system = _system_with(system, _moved(system.element(name), path.split("."), change))
+    return system
+
+
 def numbers_with(layout: Layout, values: Mapping[tuple[str, str], float]) -> tuple[np.ndarray, ...]:
     """Numbers of dynamics, constraints and sensors, with other values of declared numbers.
 
@@ -299,11 +315,7 @@ def numbers_with(layout: Layout, values: Mapping[tuple[str, str], float]) -> tup
     Raises:
         InputError: there is no such number, or with that value elements are joined otherwise.
     """
-    system = layout.system
-    for (name, path), value in values.items():
-        change = value - declared_number(system, name, path)
-        system = _system_with(system, _moved(system.element(name), path.split("."), change))
-    there = Layout(system)
+    there = Layout(system_with(layout.system, values))
     if not same_structure(there, layout):
         raise InputError(f"{choices(f'{n}.{p}' for n, p in values)} cannot be moved alone: the structure changes.")
     return tuple(_numbers(calls) for calls in (there.dynamics, there.constraints, there.sensors))
