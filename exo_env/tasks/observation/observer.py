@@ -115,7 +115,9 @@ class Observer:
         measured = [(key.partition(".")[0], c) for key, c in self.measured.items()]
         if name in _names(measured):
             return
-        fault = "shows an estimate, which has none" if name in _names(self.channels) else "is not observed"
+        fault = (
+            "shows an estimate, which has no noise of its own" if name in _names(self.channels) else "is not observed"
+        )
         there_are = choices({c.name for _, c in measured})
         raise InputError(f"noise: channel '{name}' {fault}; there are {there_are}.")
 

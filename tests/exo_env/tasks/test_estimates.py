@@ -94,7 +94,9 @@ def test_the_filter_sees_the_noise_that_the_settings_give():
 
 @pytest.mark.parametrize("name", ["load", "estimated.load", "load_deviation"])
 def test_noise_of_an_estimate_is_refused(name):
-    complaint = rf"channel '{name}' shows an estimate, which has none; there are angle, guide_force, rate\."
+    complaint = (
+        rf"channel '{name}' shows an estimate, which has no noise of its own; there are angle, guide_force, rate\."
+    )
     with pytest.raises(InputError, match=complaint):
         HiddenIntentEnv(observation=["estimated"], noise={name: {"deviation": 0.5}})
 
@@ -173,7 +175,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(errors, name, within_one,
 
 def test_the_moment_of_others_is_known_far_better_than_nothing(errors):
     error, _, truth = errors["others_moment"].T
-    # Measured 9.6 %, and 11 % on thirty others: forearms have other inertias than the filter's. Zero would err by 100 %.
+    # Measured 9.6 %, and 11 % on thirty others: forearms have other inertias than the filter's. Zero errs by 100 %.
     assert np.sqrt(np.mean(error**2)) < 0.15 * np.sqrt(np.mean(truth**2))
 
 
