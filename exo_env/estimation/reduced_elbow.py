@@ -28,6 +28,8 @@ from exo_env.patient.patient import MIDDLE
 
 FIRST, STEP, LAST = 0.0, math.radians(2.0), math.radians(144.0)
 """Angles of the table [rad]: between them moments err by less than 0.01 Nm."""
+USUAL_LOAD = 1.25
+"""Load that stands for an unknown one [kg]: the mean of what an environment draws, 0.5 to 2 kg."""
 NEAR = 0.02
 """Distance from a stop at which the elbow may rest on it [rad]."""
 SMALLEST_NOISE = 1e-6
@@ -65,8 +67,8 @@ class ReducedTuning(NamedTuple):
     """Its standard deviation among patients."""
     left_time: float = 20.0
     """In which it changes [s]."""
-    load: float = 1.25
-    """Usual load [kg]: the mean of what is lifted, 0.5 to 2 kg."""
+    load: float = USUAL_LOAD
+    """Mean of the load [kg]."""
     load_deviation: float = 0.5
     """Standard deviation of the load [kg]: those 0.43 kg, and what is picked up beside."""
     stop_doubt: float = 5.0

@@ -56,7 +56,7 @@ FAST, SLOW = 4, 2
 
 @compiled
 def begin_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, learnt, out):
-    """Begin with first readings.
+    """Begin with first readings; where one of them is not finite, no estimate is a number.
 
     Args:
         sensed: readings, at the places of SENSED.
@@ -96,8 +96,7 @@ def step_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, learn
     _predict_fast(numbers, disturbance, mean, fast, learnt)
     _correct_fast(sensed, numbers, mean, fast, learnt)
     _predict_slow(numbers, mean, slow, learnt)
-    _conclude(numbers, curves, mean, fast, slow, out)
-    if not _usable(mean, fast, slow, out):
+    if not _conclude(numbers, curves, mean, fast, slow, out):
         learnt[LEARNT.lost] += 1.0
         begin_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, learnt, out)
 
@@ -169,7 +168,16 @@ def _predict_slow(n, mean, P, learnt):
 
 @compiled
 def _conclude(n, curves, mean, fast, slow, out):
-    """Split what others put on the elbow, and fill the estimates with their deviations."""
+    """Split what others put on the elbow, and fill the estimates with their deviations.
+
+    Returns:
+        Whether belief and estimates can be used. Where the belief cannot, the table is not read, since an angle that is
+        no number has no place in it, and the estimates are no numbers.
+    """
+    if not _usable(mean, fast, slow):
+        for i in range(out.shape[0]):
+            out[i] = math.nan
+        return False
     place = (mean[BELIEF.angle] - n[NUMBERS.first_angle]) / n[NUMBERS.angle_step]
     place = min(max(place, 0.0), curves.shape[0] - 1.000001)
     k = int(place)
@@ -197,6 +205,10 @@ def _conclude(n, curves, mean, fast, slow, out):
     )
     out[ESTIMATE.load], out[ESTIMATE.load_deviation] = load, unsure_load
     out[ESTIMATE.effort], out[ESTIMATE.effort_deviation] = muscles / most, math.sqrt(unsure) / most
+    total = 0.0
+    for i in range(out.shape[0]):
+        total += out[i]
+    return math.isfinite(total) and _usable(mean, fast, slow)
 
 
 @compiled
@@ -221,17 +233,14 @@ def _split(others, noise, hold, mean, P):
 
 
 @compiled
-def _usable(mean, fast, slow, out):
-    """Whether all is finite and no variance negative."""
+def _usable(mean, fast, slow):
+    """Whether all that is believed is finite and no variance negative."""
     total, least = 0.0, 0.0
     for i in range(mean.shape[0]):
         total += mean[i]
-    for i in range(FAST):
-        total += fast[i, i]
-        least = min(least, fast[i, i])
-    for i in range(SLOW):
-        total += slow[i, i]
-        least = min(least, slow[i, i])
-    for i in range(out.shape[0]):
-        total += out[i]
+    for P in (fast, slow):
+        for i in range(P.shape[0]):
+            least = min(least, P[i, i])
+            for j in range(P.shape[0]):
+                total += P[i, j]
     return math.isfinite(total) and least >= 0.0

@@ -26,13 +26,12 @@ from dms_core.files.output_file import write_csv
 from exo_env.ecosystem.person import Person
 from exo_env.estimation import ElbowEstimator, NominalElbow
 from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, GYRO, RATE, SPECIFIC_FORCE
+from exo_env.estimation.reduced_elbow import USUAL_LOAD
 
 FIRST_SEED = 30_000
 """Of the episodes; no number of the filter was chosen on these."""
 SETTLING = 0.5
 """Part of an episode that is left out, in which the filter finds its start [s]."""
-USUAL_LOAD = 1.25
-"""Weight that stands for an unknown one: the mean of what is drawn [kg]."""
 CELL = 0.3
 """Noise of the moment of a load cell at the grip: 1 N at 0.3 m [Nm]."""
 TYPED_IN = 0.9

@@ -13,8 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from exo_env.estimation.reduced_elbow import USUAL_LOAD
+
 from ..tuned import Range
-from .assist_moment import SHARE, SMOOTHING, USUAL_LOAD, AssistMoment, Seen
+from .assist_moment import SHARE, SMOOTHING, AssistMoment, Seen
 from .known import at
 
 MOST_SHARE, HEAVIEST = 3.0, 5.0

@@ -14,6 +14,8 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import VectorEnv
 
+from exo_env.estimation.reduced_elbow import USUAL_LOAD
+
 from ..batch_policy import BatchPolicy, one_world
 from ..policy import Channels
 from ..tuned import HIDDEN_INTENT, Number, Range
@@ -23,8 +25,6 @@ SMOOTHING = Range(0.01, 0.4, True)
 DAMPING = Range(-1.5, 4.0)
 SHARE = Range(0.0, 1.5)
 CARRIED = Range(0.0, 1.2)
-USUAL_LOAD = 1.25
-"""Load of a usual weight [kg]: the mean of those that are drawn."""
 MOST_CARRIED = 2.0
 """Largest part of a usual weight that is believed to hang in the ropes [-]."""
 LEAST_MOMENT = 0.5

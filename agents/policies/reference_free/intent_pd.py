@@ -7,7 +7,9 @@ carried lately. It moves a virtual joint, whose angle stands for where the arm i
     M = weight(theta) + stiffness (theta_v - theta) + damping (omega - rate)
 
 `Admittance` moves the same joint by what the cuff feels beyond the weight of an average arm, load and strength left
-out; here neither has to be known.
+out. Here, too, the weight of an average arm and a usual load are taken for granted, by `weight` and by the filter; how
+far a patient is from them is not known. What lasts of that difference the filter counts to what the patient has carried
+lately, so that it does not move the joint for long.
 """
 
 from __future__ import annotations

@@ -17,11 +17,10 @@ from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.ecosystem.person import Person
 from exo_env.patient.excitation.motor_command import InternalModel
 from exo_env.patient.excitation.static_optimisation import needed_moment
+from exo_env.patient.patient import MIDDLE
 
 ANGLES = np.radians(np.arange(0.0, 144.0, 2.0))
 """Angles of the tables [rad]; between them moments err by less than 0.01 Nm."""
-MIDDLE = np.radians(60.0)
-"""Angle at which the inertia is taken [rad]: it is that of a rigid arm, and does not change without a weight."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class Known:
 
     @cached_property
     def inertia(self) -> float:
-        """Of forearm, hand, handle and lower link about the elbow [kg m^2]."""
+        """Of forearm, hand, handle and lower link about the elbow [kg m^2]: a rigid arm's, the same at all angles."""
         link, model = self.ecosystem.device.lower_link, self._model(0.0)
         turned, still = (needed_moment(model.arm, model.load, MIDDLE, 0.0, x) for x in (1.0, 0.0))
         return float(turned - still + link.inertia[2] + link.mass * np.sum(np.square(link.centre_of_mass[:2])))

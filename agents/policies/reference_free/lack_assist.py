@@ -21,9 +21,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from exo_env.patient.patient import MIDDLE
+
 from ..tuned import Range
 from .assist_moment import DAMPING, SHARE, SMOOTHING, AssistMoment, Seen
-from .known import MIDDLE, at
+from .known import at
 
 
 class LackAssist(AssistMoment):

@@ -28,7 +28,8 @@ class Observer:
         readings: readings of the task, in the order of its array.
         groups: channels of each group.
         noise: False for perfect channels, True for the defaults, or a mapping from a channel, by its name or as
-            "group.channel", to an Imperfection that replaces its default.
+            "group.channel", to an Imperfection that replaces its default. A channel that shows an estimate takes none:
+            the device's computer knows it as it is. The sensors of the filter behind it do, shown or not.
         period: control period [s].
     """
 
@@ -87,24 +88,38 @@ class Observer:
         """The imperfection of each channel.
 
         Raises:
-            InputError: `noise` is of another kind, or names a channel that is not observed.
+            InputError: `noise` is of another kind, or names a channel that is not observed or shows an estimate.
         """
         if isinstance(noise, Mapping):
-            names = _names(self.channels)
-            filtered = set[str]() if self.device is None else _names(self.device.channels)
             for name in noise:
-                if name not in names | filtered:
-                    seen = choices({c.name for _, c in self.channels})
-                    raise InputError(f"noise: channel '{name}' is not observed; there are {seen}.")
+                self._check_measured(name)
+            shown = [(group, c) for group, c in self.channels if f"{group}.{c.name}" in self.measured]
+            names = _names(shown)
             given = {name: _imperfection(name, value) for name, value in noise.items() if name in names}
             return [
-                given.get(f"{group}.{c.name}", given.get(c.name, c.imperfection)) for group, c in self.channels
+                given.get(f"{group}.{c.name}", given.get(c.name, c.imperfection)) if (group, c) in shown
+                else c.imperfection for group, c in self.channels
             ]  # fmt: skip
         if not isinstance(noise, bool):
             raise InputError(
                 f"noise = {plain(noise)!r}: expected True, False or a mapping from channels to imperfections."
             )
         return [c.imperfection if noise else Imperfection() for _, c in self.channels]
+
+    def _check_measured(self, name: str) -> None:
+        """Check that there is a channel of this name, or "group.channel", whose imperfection counts.
+
+        Raises:
+            InputError: there is none, or all of this name show estimates.
+        """
+        measured = [(key.partition(".")[0], c) for key, c in self.measured.items()]
+        if name in _names(measured):
+            return
+        fault = (
+            "shows an estimate, which has no noise of its own" if name in _names(self.channels) else "is not observed"
+        )
+        there_are = choices({c.name for _, c in measured})
+        raise InputError(f"noise: channel '{name}' {fault}; there are {there_are}.")
 
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:

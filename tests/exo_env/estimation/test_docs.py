@@ -41,6 +41,8 @@ def test_the_table_is_that_of_the_file(table, file, ending):
         assert cells[4].rpartition(" ")[0] == f"{error:.2f} of {rms:.2f}"
         covered = float(row["coverage_95"])
         assert cells[5] == ("" if math.isnan(covered) else f"{100.0 * covered:.1f} %")
+        by_patient = [row[f"coverage_{name}_patient"] for name in ("least", "tenth")] if len(cells) > 6 else []
+        assert cells[6:] == [f"{100.0 * float(x):.1f} %" for x in by_patient]
 
 
 def test_the_channels_of_the_page_are_those_of_the_group():

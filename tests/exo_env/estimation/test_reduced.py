@@ -10,17 +10,20 @@ import pytest
 from dms_core import Model, SolverOptions, World
 from exo_env.ecosystem.person import HEIGHT_0, MASS_0
 from exo_env.envs.hidden_intent import HiddenIntentEnv
+from exo_env.envs.settings import DEFAULT_LOAD
 from exo_env.estimation import ElbowEstimator, NominalElbow
 from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, RATE
 from exo_env.estimation.nominal_elbow import GRIP, NET
-from exo_env.estimation.reduced_elbow import ReducedTuning, reduced_elbow
+from exo_env.estimation.reduced_elbow import USUAL_LOAD, ReducedTuning, reduced_elbow
 from exo_env.estimation.reduced_filter import (
     BELIEF,
+    CURVES,
     ESTIMATE,
     FAST,
     LEARNT,
     NUMBERS,
     SLOW,
+    _conclude,
     begin_estimates,
     step_estimates,
 )
@@ -168,16 +171,49 @@ def test_what_is_intended_is_what_is_new():
     assert abs(late[ESTIMATE.intended_moment]) < 0.3 * begun[ESTIMATE.intended_moment]
 
 
+PLACES = {"mean": len(BELIEF), "fast": FAST * FAST, "slow": SLOW * SLOW, "learnt": LEARNT.lost}
+"""What the filter keeps, and how many numbers of it can be broken: the count of new beginnings is none."""
+
+
 @pytest.mark.parametrize("broken", [np.nan, np.inf, -1e300])
-@pytest.mark.parametrize("what", ["mean", "fast", "slow", "learnt"])
-def test_a_filter_that_is_lost_begins_anew(what, broken):
+@pytest.mark.parametrize("what, place", [(what, k) for what, n in PLACES.items() for k in range(n)])
+def test_a_filter_that_is_lost_begins_anew(what, place, broken):
     one = Filter(0.02)
     one.take((0.8, 0.0, 3.0), first=True)
-    getattr(one, what).flat[0] = broken
+    getattr(one, what).flat[place] = broken
     found = one.take((0.8, 0.0, 3.0))
     assert np.isfinite(found).all() and np.isfinite(one.fast).all() and np.isfinite(one.slow).all()
-    again = one.take((0.8, 0.0, 3.0))
+    for _ in range(2):
+        again = one.take((0.8, 0.0, 3.0))
     assert abs(again[ESTIMATE.others_moment] + 0.16 * 3.0) < 0.1
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf])
+@pytest.mark.parametrize("what, place", [(what, k) for what in ("mean", "fast", "slow") for k in range(PLACES[what])])
+def test_a_belief_that_is_not_finite_reads_no_table(what, place, broken):
+    """In Python, where an angle that is no number can be no index, and in a table that must not be read at all."""
+    one = Filter(0.02)
+    one.take((0.8, 0.0, 3.0), first=True)
+    getattr(one, what).flat[place] = broken
+    numbers, nothing = one.elbow.numbers, np.zeros((0, len(CURVES)))
+    assert not _conclude.py_func(numbers, nothing, one.mean, one.fast, one.slow, one.out)
+    assert np.isnan(one.out).all()
+
+
+@pytest.mark.parametrize("reading", [np.nan, np.inf])
+@pytest.mark.parametrize("place", range(3))
+def test_after_readings_that_are_no_numbers_the_filter_begins_anew(place, reading):
+    one, broken = Filter(0.02), np.array([0.8, 0.0, 3.0])
+    broken[place] = reading
+    assert np.isnan(one.take(broken, first=True)).all()
+    assert np.isfinite(one.take((0.8, 0.0, 3.0))).all()
+    assert np.isnan(one.take(broken)).all()
+    found = one.take((0.8, 0.0, 3.0))
+    assert np.isfinite(found).all() and one.learnt[LEARNT.lost] == 3.0
+
+
+def test_the_usual_load_is_the_mean_of_what_is_drawn():
+    assert ReducedTuning().load == USUAL_LOAD == np.mean(DEFAULT_LOAD["uniform"])
 
 
 @pytest.mark.parametrize("reading", [1e6, -1e6])
