@@ -46,7 +46,7 @@ def bowl(fails=lambda x: False, stop_at: int | None = None):
     """In place of runs: 1e7 (x - 0.14)^4 + 1 of the guide's distance, which fails where it is told to."""
     calls: list[float] = []
 
-    def mean_gradient(designs, who, objective, options, x):
+    def mean_gradient(designs, who, objective, options, acceptance, x):
         calls.append(float(x[0]))
         if len(calls) == stop_at:
             raise KeyboardInterrupt
@@ -90,7 +90,7 @@ def test_progress_is_told_for_each_iteration(monkeypatch):
 def test_an_objective_that_hardly_depends_on_the_design_is_lowered_too(monkeypatch):
     """A thousandth is there to be gained: a first step as long as the slope would end the search where it began."""
 
-    def mean_gradient(designs, who, objective, options, x):
+    def mean_gradient(designs, who, objective, options, acceptance, x):
         return 2.0 * (x[0] - 0.14) ** 2 + 1.0, 4.0 * (x - 0.14)
 
     monkeypatch.setattr(module, "mean_gradient", mean_gradient)
