@@ -12,7 +12,7 @@ from exo_env.ecosystem.exoskeleton import Exoskeleton
 
 MOST_OFF = 5.0
 """Largest rms tracking error [deg]; assumed: the shipped device has 0.3, on a compliant cuff 2, and an arm that is not
-lifted through the shipped exercise some 40."""
+lifted through the shipped exercise 47."""
 LAG = 2.0
 """Largest tracking error, as a multiple of that of today's device on the same patient; assumed."""
 

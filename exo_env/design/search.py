@@ -31,8 +31,8 @@ FIRST_STEP = 0.25
 GAIN = 1e-4
 """Relative gain of an iteration below which the search ends; runs err by less."""
 ENDINGS = {
-    0: f"It converged: an iteration gains less than {100.0 * GAIN:g} % of the objective, or no number has a way down within "
-    "its bounds.",
+    0: f"It converged: an iteration gains less than {100.0 * GAIN:g} % of the objective, or no number has a way down "
+    "within its bounds.",
     1: "The iterations are spent (--iterations); more of them may lower the objective further.",
     2: "The line search found no acceptable design with a lower objective along its last direction.",
 }

@@ -9,7 +9,7 @@ tremor, which need the compiled worlds of the environments, do not.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -137,7 +137,7 @@ def exercise_times(exercise: Exercise, interval: float) -> Sequence[float]:
     return [exercise.duration * (k + 1) / count for k in range(count)]
 
 
-def tracking_error(exercise: Exercise, times: Sequence[float], angle: np.ndarray) -> float:
+def tracking_error(exercise: Exercise, times: Iterable[float], angle: np.ndarray) -> float:
     """Root of the mean square by which the elbow's angle [rad] at some times [s] is off the movement [deg]."""
     off = np.degrees(angle - [exercise.course(t)[0] for t in times])
     return float(np.sqrt((off**2).mean()))

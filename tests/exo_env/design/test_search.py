@@ -66,6 +66,34 @@ def test_a_run_that_fails_is_told_and_not_acceptable(monkeypatch):
     assert 0.139 <= found.x[0] < 0.15 and found.value < found.start
 
 
+def test_a_step_to_a_device_that_does_not_do_the_exercise_is_not_acceptable(monkeypatch):
+    class Lagging:
+        """In place of a run: 1 deg off, and 3 where the guide is nearer than 0.139 m, which the objective asks for."""
+
+        def __init__(self, wearer, designs, x, options):
+            self.x, self.tension, self.off = x, 100.0, 1.0 if x[0] > 0.139 else 3.0
+
+        def gradient(self, objective):
+            return float(self.x[0]), np.ones(1)
+
+    monkeypatch.setattr(module, "Trial", Lagging)
+    said: list[str] = []
+    designs = space(bounds={"guide_distance": (0.1, 0.19)})
+    found = search(designs, few(1), OBJECTIVES["motor_power"], OPTIONS, 20, said.append)
+    assert any("patient 1: the elbow is 3 deg rms off" in sentence for sentence in said)
+    assert 0.139 < found.x[0] < 0.15 and found.refused
+
+
+@pytest.mark.parametrize(
+    ("iterations", "beyond", "ending"),
+    [(30, 0.0, "It converged"), (1, 0.0, "The iterations are spent"), (30, 0.1599, "The line search found no")],
+)
+def test_the_reason_of_the_end_is_told(iterations, beyond, ending, monkeypatch):
+    monkeypatch.setattr(module, "mean_gradient", bowl(fails=lambda x: x < beyond))
+    found = search(space(bounds={"guide_distance": (0.1, 0.19)}), [], OBJECTIVES["peak_tension"], OPTIONS, iterations)
+    assert found.ending.startswith(ending)
+
+
 def test_a_run_that_fails_today_is_an_error(monkeypatch):
     monkeypatch.setattr(module, "mean_gradient", bowl(fails=lambda x: True))
     with pytest.raises(SimulationError, match="patient 1"):
