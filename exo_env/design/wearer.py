@@ -2,8 +2,9 @@
 
 As in the paper's scenarios: the patient plans the movement for the weight that he expects, and the device follows the
 reference with its PID on all ropes. Of a patient count the body, strength, both maximum activations, the muscles' time
-constants, the expected load, and the gain and delay of proprioception; delays of the command, fatigue, spasticity and
-tremor, which need the compiled worlds of the environments, do not.
+constants, the expected load, and the gain and delay of proprioception; delays of the command, co-contraction, fatigue,
+also that at the start, slacking and effort at the start, spasticity and tremor, which need the compiled worlds of the
+environments, do not.
 """
 
 from __future__ import annotations
@@ -62,6 +63,7 @@ class Wearer:
 
     def __init__(self, name: str, patient: Patient, setting: Setting, like: Wearer | None = None) -> None:
         self.name, self.patient, self.exercise = name, patient, setting.exercise
+        # An ecosystem has one gain, as in the paper's scenarios: the extensors' is scaled by the flexors' weakness, too.
         reflex = patient.feedback_gain * patient.maximum_activation_flexors
         self._ecosystem = Ecosystem(
             person=patient.person, subject=setting.subject, weight=setting.weight, misalignment=setting.misalignment,
