@@ -63,7 +63,7 @@ class Wearer:
 
     def __init__(self, name: str, patient: Patient, setting: Setting, like: Wearer | None = None) -> None:
         self.name, self.patient, self.exercise = name, patient, setting.exercise
-        # An ecosystem has one gain, as in the paper's scenarios: the flexors' weakness scales that of the extensors, too.
+        # An ecosystem has one gain, as in the paper's scenarios: the flexors' weakness scales the extensors', too.
         reflex = patient.feedback_gain * patient.maximum_activation_flexors
         self._ecosystem = Ecosystem(
             person=patient.person, subject=setting.subject, weight=setting.weight, misalignment=setting.misalignment,
