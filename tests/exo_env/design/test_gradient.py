@@ -25,7 +25,7 @@ UNSEEN = {
 """Derivatives that are smaller than what differences of runs err by: the guide of an aligned device moves no rope, and
 the other one happens to be near 0 here."""
 LOWERING = {"times": [0.0, 0.1], "angles_deg": [55.0, 50.0], "duration": 0.15, "proprioception": {}}
-"""A jerk downwards in which first the antagonist pulls and then the agonist, so that the ends of both ropes count."""
+"""A jerk downwards in which first the antagonist pulls and then the agonist; UNSEEN shows that the ends of both ropes count."""
 CASES = {"rigid": (ALIGNED, False), "askew": (ASKEW, False), "compliant": (ALIGNED, True)}
 """How the device is worn, and whether the cuff is compliant."""
 
@@ -82,9 +82,6 @@ def test_every_objective_by_every_number(case):
         assert np.abs(slope - expected[:, k]).max() < tolerance, name
         unseen = {designs.names[i] for i in np.flatnonzero(np.abs(expected[:, k]) <= tolerance)}
         assert unseen <= UNSEEN.get((case, name), set()), "these derivatives could as well be 0"
-        if name == "peak_tension":
-            ends = [k for k, number in enumerate(designs.names) if number.startswith("ropes.antagonist.lower")]
-            assert np.abs(slope[ends]).max() > 0.01 * np.abs(slope).max(), "the antagonist does not count here"
 
 
 def test_the_start_of_a_device_worn_askew_depends_on_the_guide():
