@@ -25,7 +25,7 @@ UNSEEN = {
 """Derivatives that are smaller than what differences of runs err by: the guide of an aligned device moves no rope, and
 the other one happens to be near 0 here."""
 LOWERING = {"times": [0.0, 0.1], "angles_deg": [55.0, 50.0], "duration": 0.15, "proprioception": {}}
-"""A jerk downwards in which first the antagonist pulls and then the agonist, so that the ends of both ropes are seen."""
+"""A jerk down in which first the antagonist pulls and then the agonist, so that the ends of both ropes are seen."""
 CASES = {"rigid": (ALIGNED, False), "askew": (ASKEW, False), "compliant": (ALIGNED, True)}
 """How the device is worn, and whether the cuff is compliant."""
 
