@@ -1,6 +1,6 @@
 """What a found design is worth: true peaks and more in today's device and in the found one, patient by patient.
 
-Numbers are of a run's table with a row every 5 ms, not of the smoothed objective.
+Numbers are of a run's table with a row every 5 ms behind its start, not of the smoothed objective.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 
 from dms_core import SolverOptions, simulate
 from dms_core.errors import SimulationError
+from exo_env.design.acceptance import Acceptance
 from exo_env.design.space import Design
-from exo_env.design.wearer import Wearer, exercise_times, rate_sensor
+from exo_env.design.wearer import Wearer, exercise_times, rate_sensor, tracking_error
 from exo_env.ecosystem.sensors import tension_sensor
 
 SAMPLE = 0.005
-"""Interval of the tables [s]."""
+"""Longest interval of the tables [s]."""
 QUANTITIES = {
     "peak rope tension": "N",
     "peak elbow reaction": "N",
@@ -29,6 +30,8 @@ QUANTITIES = {
     "rms tracking error": "deg",
 }
 """Rows of the comparison with their units."""
+TENSION, OFF = (list(QUANTITIES).index(name) for name in ("peak rope tension", "rms tracking error"))
+"""Places of those that a device is judged by."""
 HEAD = ("patients", "quantity", "unit", "today", "found", "change_percent")
 
 
@@ -43,17 +46,17 @@ def quantities(wearer: Wearer, design: Design, options: SolverOptions) -> np.nda
         trajectory = simulate(model, end, options).check()
     except SimulationError as error:
         raise SimulationError(f"{wearer.name}: {error}") from None
-    times = np.array([0.0, *exercise_times(wearer.exercise, SAMPLE)])
+    times = np.array(exercise_times(wearer.exercise, SAMPLE))
     y, ropes = trajectory.sensors(times), tuple(design.device.ropes)
     tension = np.array([y[tension_sensor(r)] for r in ropes])
     power = -tension * np.array([y[rate_sensor(r)] for r in ropes])
     reaction, guide = (
         np.sqrt(sum(y[f"{name}.F{axis}"] ** 2 for axis in "xyz")) for name in ("elbow_reaction", "guide_force")
     )
-    off = np.degrees(y["elbow_angle.angle"] - [wearer.exercise.course(t)[0] for t in times])
     return np.array([
         tension.max(), reaction.max(), np.sqrt((power**2).sum(axis=0).mean()),
-        np.maximum(power, 0.0).sum(axis=0).mean(), guide.max(), np.sqrt((off**2).mean()),
+        np.maximum(power, 0.0).sum(axis=0).mean(), guide.max(),
+        tracking_error(wearer.exercise, times, y["elbow_angle.angle"]),
     ])  # fmt: skip
 
 
@@ -82,16 +85,23 @@ def compared(
 ) -> Comparison:  # fmt: skip
     """Both designs on some wearers; one whose run fails in either is left out with a sentence.
 
+    A wearer with whom a device does not do the exercise counts, and is told: the table is there to show it.
+
     Raises:
         SimulationError: none of them comes to the end of a run.
     """
-    names, before, after = [], [], []
+    names, before, after, acceptance = [], [], [], Acceptance()
     for wearer in who:
         try:
             pair = [quantities(wearer, design, options) for design in (today, found)]
         except SimulationError as error:
             say(f"left out of the table: {error}")
             continue
+        for which, design, row in zip(("today's", "the found"), (today, found), pair, strict=True):
+            try:
+                acceptance.check(wearer.name, design.device, row[OFF], row[TENSION])
+            except SimulationError as error:
+                say(f"in {which} device: {error}")
         names.append(wearer.name)
         before.append(pair[0])
         after.append(pair[1])

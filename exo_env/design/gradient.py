@@ -27,10 +27,12 @@ from dms_core.sensitivity.run import Sensitivity, Start
 from dms_core.validation import numbers_in
 from exo_env.design.objectives import Objective
 from exo_env.design.space import DesignSpace
-from exo_env.design.wearer import Wearer, exercise_times
+from exo_env.design.wearer import Wearer, exercise_times, tracking_error
+from exo_env.ecosystem.sensors import tension_sensor
 
 INTERVAL = 0.05
-"""Time between the samples of a run that an objective sees [s]; a movement of two seconds has its peak for longer."""
+"""Longest time between the samples of a run that an objective sees [s]; a movement of two seconds has its peak for
+longer."""
 STEP = 1e-4
 """Step of these differences, as a part of the width of the bounds: of attachment points, micrometres."""
 
@@ -120,9 +122,17 @@ class Trial:
         self.model = wearer.model(space.design(x))
         self.times = exercise_times(wearer.exercise, INTERVAL)
         self.record = RecordedWorld(self.model, options)
+        readings = []
         for t in self.times:
             if self.record.advance(t) is not Result.SUCCESS:
                 raise SimulationError(f"{wearer.name}: {self.record.message}")
+            readings.append(self.record.read().copy())
+        names = [name for name, _ in self.model.layout.outputs]
+        y = dict(zip(names, np.array(readings).T, strict=True))
+        self.off = tracking_error(wearer.exercise, self.times, y["elbow_angle.angle"])
+        """Tracking error [deg]."""
+        self.tension = max(float(y[tension_sensor(rope)].max()) for rope in self.ropes)
+        """Largest of any rope [N]."""
 
     def value(self, objective: Objective) -> float:
         """J of the run."""

@@ -2,8 +2,8 @@
 
 Variables are scaled so that the bounds are 0 and 1, and the objective so that the first step, which is that of steepest
 descent, has FIRST_STEP as its longest part, whether an objective is sensitive or hardly so. A design in which a run
-fails, or that no device can have, is not acceptable: it counts as REFUSED times today's value with no slope, so that
-the line search turns back. The best design so far is kept whatever happens.
+fails or the exercise is not done, or that no device can have, is not acceptable: it counts as REFUSED times today's
+value with no slope, so that the line search turns back. The best design so far is kept whatever happens.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy.optimize import minimize
 
 from dms_core import SolverOptions
 from dms_core.errors import DmsError, SimulationError
+from exo_env.design.acceptance import Acceptance
 from exo_env.design.gradient import Trial
 from exo_env.design.objectives import Objective
 from exo_env.design.space import DesignSpace
@@ -29,6 +30,13 @@ FIRST_STEP = 0.25
 """Longest part of the first step, as a part of the width of the bounds."""
 GAIN = 1e-4
 """Relative gain of an iteration below which the search ends; runs err by less."""
+ENDINGS = {
+    0: f"It converged: an iteration gains less than {100.0 * GAIN:g} % of the objective, or no number has a way down "
+    "within its bounds.",
+    1: "The iterations are spent (--iterations); more of them may lower the objective further.",
+    2: "The line search found no acceptable design with a lower objective along its last direction.",
+}
+"""Why a search ended, by the status of scipy's L-BFGS-B."""
 
 
 @dataclass
@@ -47,6 +55,8 @@ class Found:
     """A sentence for each design that was not acceptable."""
     stopped: bool = False
     """Whether the search was stopped by the user."""
+    ending: str = ENDINGS[0]
+    """Why it ended, a sentence."""
 
 
 def search(
@@ -68,11 +78,11 @@ def search(
         say: is called with a sentence on each iteration, and on each design that is not acceptable.
 
     Raises:
-        SimulationError: a run in today's design fails, or has nothing to lower.
+        SimulationError: a run in today's design fails, does not do the exercise, or has nothing to lower.
         KeyboardInterrupt: stopped before today's design was evaluated.
     """
     width = space.high - space.low
-    mean = partial(mean_gradient, space, who, objective, options)
+    mean = partial(mean_gradient, space, who, objective, options, Acceptance())
     value, slope = mean(space.start)
     if value == 0.0:
         raise SimulationError(f"{objective.title}: it is 0 in today's design; there is nothing to lower.")
@@ -100,12 +110,13 @@ def search(
         )
 
     try:
-        minimize(
+        done = minimize(
             scaled, begin, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(width),
             callback=tell, options={"maxiter": iterations, "ftol": GAIN * min(1.0, scale * value), "maxls": 5},
         )  # fmt: skip
+        found.ending = ENDINGS[done.status]
     except KeyboardInterrupt:
-        found.stopped = True
+        found.stopped, found.ending = True, "It was stopped."
     return found
 
 
@@ -125,13 +136,22 @@ def _tried(
 
 
 def mean_gradient(
-    space: DesignSpace, who: Sequence[Wearer], objective: Objective, options: SolverOptions, x: np.ndarray
+    space: DesignSpace,
+    who: Sequence[Wearer],
+    objective: Objective,
+    options: SolverOptions,
+    acceptance: Acceptance,
+    x: np.ndarray,
 ) -> tuple[float, np.ndarray]:
     """Mean objective over some wearers, and its gradient, shape (n,).
 
     Raises:
         InputError: there can be no such device.
-        SimulationError: a run fails; names the wearer.
+        SimulationError: a run fails or does not do the exercise; names the wearer.
     """
-    parts = [Trial(wearer, space, x, options).gradient(objective) for wearer in who]
+    device, parts = space.design(x).device, []
+    for wearer in who:
+        trial = Trial(wearer, space, x, options)
+        acceptance.check(wearer.name, device, trial.off, trial.tension)
+        parts.append(trial.gradient(objective))
     return float(np.mean([value for value, _ in parts])), np.mean([slope for _, slope in parts], axis=0)

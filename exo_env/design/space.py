@@ -29,6 +29,10 @@ REACH = 0.03
 """How far an attachment point or the guide may be moved without bounds of one's own [m]; assumed."""
 FACTOR = 2.0
 """By which the cuff may be softer or stiffer without bounds of one's own; assumed."""
+CLIPPING = 7
+"""Halvings by which such a bound is clipped to what a device can have: it then lies within a hundredth of the limit."""
+LEAST_WIDTH = 1e-6
+"""Least width of bounds in SI units, and as a part of today's value if that is above 1; nothing is made more finely."""
 DESIGNED = ("ropes", "guide_distance")
 """Parts of a device's file whose numbers may be designed."""
 
@@ -107,7 +111,7 @@ def usual_bounds(design: Design) -> dict[str, tuple[float, float]]:
     """Bounds of a design for which none are given.
 
     Both ends of each rope in the plane of motion and the guide within REACH of where they are; the cuff's stiffnesses
-    across and along the forearm within FACTOR.
+    across and along the forearm within FACTOR. All are clipped to what a device can have whose other numbers stay.
     """
     found = {}
     for name, value in design.numbers().items():
@@ -115,7 +119,33 @@ def usual_bounds(design: Design) -> dict[str, tuple[float, float]]:
             found[name] = (value - REACH, value + REACH)
         elif name in ("cuff.stiffness.0", "cuff.stiffness.1") and value > 0.0:
             found[name] = (value / FACTOR, value * FACTOR)
-    return found
+    clipped = {name: (_clipped(design, name, low), _clipped(design, name, high)) for name, (low, high) in found.items()}
+    return {name: (low, high) for name, (low, high) in clipped.items() if high - low >= _least_width(high)}
+
+
+def _clipped(design: Design, name: str, end: float) -> float:
+    """A bound, or the farthest on the way there from today's value that a device can have."""
+    if _is_possible(design, name, end):
+        return end
+    inside, outside = design.numbers()[name], end
+    for _ in range(CLIPPING):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if _is_possible(design, name, middle) else (inside, middle)
+    return inside
+
+
+def _is_possible(design: Design, name: str, value: float) -> bool:
+    """Whether there can be a device with one number changed."""
+    try:
+        design.changed({name: value})
+    except InputError:
+        return False
+    return True
+
+
+def _least_width(value: float) -> float:
+    """Least width of the bounds of a number."""
+    return LEAST_WIDTH * max(1.0, abs(value))
 
 
 class DesignSpace:
@@ -126,7 +156,7 @@ class DesignSpace:
         bounds: least and largest value of each number that is designed; None: `usual_bounds`.
 
     Raises:
-        InputError: an unknown number, bounds that are empty or leave out today's value, or an end of them at which
+        InputError: an unknown number, bounds that are too narrow or leave out today's value, or an end of them at which
             there can be no such device.
     """
 
@@ -167,8 +197,11 @@ def _check(name: str, low: float, high: float, known: Mapping[str, float]) -> No
     if name not in known:
         more = "" if any(x.startswith("cuff.") for x in known) else " ('cuff. ...' only with a compliant cuff)"
         raise InputError(f"bounds: '{name}' is no number that can be designed. Expected one of {choices(known)}{more}.")
-    if not low < high:
-        raise InputError(f"bounds: {name} = [{low:g}, {high:g}]: expected a least value below the largest.")
+    if not high - low >= _least_width(known[name]):
+        raise InputError(
+            f"bounds: {name} = [{low:.9g}, {high:.9g}]: expected a least value below the largest, by at least "
+            f"{_least_width(known[name]):g}."
+        )
     if not low <= known[name] <= high:
         raise InputError(
             f"bounds: {name} = [{low:g}, {high:g}]: expected bounds with today's value, {known[name]:g}, between them."

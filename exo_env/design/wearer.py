@@ -2,13 +2,15 @@
 
 As in the paper's scenarios: the patient plans the movement for the weight that he expects, and the device follows the
 reference with its PID on all ropes. Of a patient count the body, strength, both maximum activations, the muscles' time
-constants, the expected load, and the gain and delay of proprioception; delays of the command, fatigue, spasticity and
-tremor, which need the compiled worlds of the environments, do not.
+constants, the expected load, and the gain and delay of proprioception; delays of the command, co-contraction, fatigue,
+also that at the start, slacking and effort at the start, spasticity and tremor, which need the compiled worlds of the
+environments, do not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +32,8 @@ from exo_env.settings import Settings
 
 EXERCISE = "design/exercise.yaml"
 """The movement that a device is designed on without one of one's own."""
+LEAST_SAMPLES = 40
+"""Least number of times at which an exercise is looked at: as many as two seconds have at the usual interval."""
 
 
 def rate_sensor(rope: str) -> str:
@@ -59,6 +63,7 @@ class Wearer:
 
     def __init__(self, name: str, patient: Patient, setting: Setting, like: Wearer | None = None) -> None:
         self.name, self.patient, self.exercise = name, patient, setting.exercise
+        # An ecosystem has one gain, as in the paper's scenarios: the flexors' weakness scales the extensors', too.
         reflex = patient.feedback_gain * patient.maximum_activation_flexors
         self._ecosystem = Ecosystem(
             person=patient.person, subject=setting.subject, weight=setting.weight, misalignment=setting.misalignment,
@@ -123,6 +128,18 @@ def wearers(source: Population, seed: int, count: int, setting: Setting) -> list
 
 
 def exercise_times(exercise: Exercise, interval: float) -> Sequence[float]:
-    """Times of an exercise behind its start, `interval` apart [s], the last one its end."""
-    count = max(round(exercise.duration / interval), 1)
+    """Equidistant times of an exercise behind its start [s], the last one its end.
+
+    Args:
+        exercise: the movement.
+        interval: largest time between two of them [s]; a short exercise has LEAST_SAMPLES, nearer to each other.
+    """
+    # Rounding must not add a sample to an exercise of whole intervals.
+    count = max(math.ceil(exercise.duration / interval - 1e-9), LEAST_SAMPLES)
     return [exercise.duration * (k + 1) / count for k in range(count)]
+
+
+def tracking_error(exercise: Exercise, times: Iterable[float], angle: np.ndarray) -> float:
+    """Root of the mean square by which the elbow's angle [rad] at some times [s] is off the movement [deg]."""
+    off = np.degrees(angle - [exercise.course(t)[0] for t in times])
+    return float(np.sqrt((off**2).mean()))

@@ -27,6 +27,7 @@ def tiny(tmp_path):
 def test_from_end_to_end(tiny, tmp_path, capsys):
     assert main([*tiny, "--cuff", "compliant"]) == 0
     printed, out = capsys.readouterr().out, tmp_path / "out"
+    assert "\nThe iterations are spent" in printed
     assert "iteration 1: " in printed and "ropes.agonist.lower.1" in printed and "held out, 1 patients" in printed
     assert {"device.yaml", "cuff.yaml", "design.csv", "devices.png"} < {path.name for path in out.iterdir()}
     with (out / "design.csv").open(newline="") as file:
@@ -69,11 +70,26 @@ def test_a_run_that_fails_today_is_a_sentence(tiny, capsys, monkeypatch):
     assert "The analysis failed: patient 1: no." in capsys.readouterr().err
 
 
+def test_a_found_cuff_can_be_designed_further(tiny, tmp_path, monkeypatch):
+    begun = []
+
+    def search(space, *given):
+        begun.append(space.today.cuff)
+        raise command.SimulationError("seen.")
+
+    (tmp_path / "cuff.yaml").write_text("stiffness: [2000, 2250, 3150, 10.6, 2, 12]\n")
+    monkeypatch.setattr(command, "search", search)
+    assert main([*tiny, "--cuff", str(tmp_path / "cuff.yaml")]) == 1
+    assert begun[0].stiffness[0] == 2000.0
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (["--objective", "comfort"], "objective = 'comfort': expected one of"),
         (["--population", "giants"], "unknown population 'giants'"),
+        (["--cuff", "soft"], "cuff = 'soft': expected one of compliant, rigid, or a YAML file"),
+        (["--cuff", "missing.yaml"], "missing.yaml"),
         (["--exoskeleton", "knee"], "exoskeleton = 'knee': expected one of"),
         (["--exoskeleton", "missing.yaml"], "missing.yaml"),
         (["--patients", "0"], "--patients 0: expected a whole number from 1"),

@@ -14,20 +14,34 @@ PART = 0.02
 TOLERANCE = 2e-5
 """Of the objective, and of its largest derivative. Runs choose their steps anew in each design and err by rtol = 1e-7
 of an objective, which over PART is 5e-6 of it, four runs together; differences of the fourth order err by less."""
+SPREAD = 3.0
+"""Tolerance of each derivative, as a multiple of the largest by which differences of steps PART and 2 PART disagree:
+the error that runs bring is the same for all numbers, is measured, and the longer step has half of it."""
+UNSEEN = {
+    ("rigid", "peak_tension"): {"guide_distance"},
+    ("rigid", "elbow_reaction"): {"ropes.agonist.upper.1"},
+    ("rigid", "motor_power"): {"guide_distance"},
+}
+"""Derivatives that are smaller than what differences of runs err by: the guide of an aligned device moves no rope, and
+the other one happens to be near 0 here."""
 LOWERING = {"times": [0.0, 0.1], "angles_deg": [55.0, 50.0], "duration": 0.15, "proprioception": {}}
-"""A jerk downwards in which first the antagonist pulls and then the agonist, so that the ends of both ropes count."""
+"""A jerk down in which first the antagonist pulls and then the agonist, so that the ends of both ropes are seen."""
 CASES = {"rigid": (ALIGNED, False), "askew": (ASKEW, False), "compliant": (ALIGNED, True)}
 """How the device is worn, and whether the cuff is compliant."""
 
 
-def difference(wearer, designs, x, direction) -> list[float]:
-    """Derivative of each objective along a direction, by central differences of the fourth order."""
-    ends = [Trial(wearer, designs, x + k * PART * direction, TIGHT) for k in (2, 1, -1, -2)]
-    found = []
-    for objective in OBJECTIVES.values():
-        far, high, low, near = (end.value(objective) for end in ends)
-        found.append((8.0 * (high - low) - (far - near)) / (12.0 * PART))
-    return found
+def differences(wearer, designs, x, direction, sizes=(1,)) -> np.ndarray:
+    """Derivatives along a direction, by central differences of the fourth order, shape (sizes, objectives).
+
+    Steps are multiples of PART.
+    """
+    values = {}
+    for k in sorted({sign * part * size for size in sizes for part in (1, 2) for sign in (1, -1)}):
+        end = Trial(wearer, designs, x + k * PART * direction, TIGHT)
+        values[k] = np.array([end.value(objective) for objective in OBJECTIVES.values()])
+    return np.array([
+        (8.0 * (values[s] - values[-s]) - (values[2 * s] - values[-2 * s])) / (12.0 * s * PART) for s in sizes
+    ])  # fmt: skip
 
 
 def off_today(designs):
@@ -44,7 +58,7 @@ def test_the_derivative_along_a_direction(case):
     shift, cuff = CASES[case]
     wearer, designs = few(1, shift, exercise=LOWERING, cuff=cuff)[0], space(cuff)
     x, direction = off_today(designs), np.random.default_rng(1).uniform(-1.0, 1.0, len(designs.names)) * widths(designs)
-    expected, trial = difference(wearer, designs, x, direction), Trial(wearer, designs, x, TIGHT)
+    (expected,), trial = differences(wearer, designs, x, direction), Trial(wearer, designs, x, TIGHT)
     for (name, objective), along in zip(OBJECTIVES.items(), expected, strict=True):
         value, slope = trial.gradient(objective)
         assert value == pytest.approx(trial.value(objective), rel=1e-12)
@@ -58,14 +72,16 @@ def test_every_objective_by_every_number(case):
     wearer, designs = few(1, shift, exercise=LOWERING, cuff=cuff)[0], space(cuff)
     x = off_today(designs)
     trial = Trial(wearer, designs, x, TIGHT)
-    expected = np.array([difference(wearer, designs, x, step) for step in np.diag(widths(designs))])
+    steps = np.diag(widths(designs))
+    short, expected = np.moveaxis([differences(wearer, designs, x, step, (1, 2)) for step in steps], 1, 0)
     for k, (name, objective) in enumerate(OBJECTIVES.items()):
         value, slope = trial.gradient(objective)
         slope *= widths(designs)
-        assert np.abs(slope - expected[:, k]).max() < TOLERANCE * (value + np.abs(expected[:, k]).max()), name
-        if name == "peak_tension":
-            ends = [k for k, number in enumerate(designs.names) if number.startswith("ropes.antagonist.lower")]
-            assert np.abs(slope[ends]).max() > 0.01 * np.abs(slope).max(), "the antagonist does not count here"
+        tolerance = SPREAD * np.abs(short[:, k] - expected[:, k]).max()
+        assert tolerance < SPREAD * TOLERANCE * (value + np.abs(expected[:, k]).max()), "the differences do not hold"
+        assert np.abs(slope - expected[:, k]).max() < tolerance, name
+        unseen = {designs.names[i] for i in np.flatnonzero(np.abs(expected[:, k]) <= tolerance)}
+        assert unseen <= UNSEEN.get((case, name), set()), "these derivatives could as well be 0"
 
 
 def test_the_start_of_a_device_worn_askew_depends_on_the_guide():

@@ -46,7 +46,7 @@ def bowl(fails=lambda x: False, stop_at: int | None = None):
     """In place of runs: 1e7 (x - 0.14)^4 + 1 of the guide's distance, which fails where it is told to."""
     calls: list[float] = []
 
-    def mean_gradient(designs, who, objective, options, x):
+    def mean_gradient(designs, who, objective, options, acceptance, x):
         calls.append(float(x[0]))
         if len(calls) == stop_at:
             raise KeyboardInterrupt
@@ -64,6 +64,34 @@ def test_a_run_that_fails_is_told_and_not_acceptable(monkeypatch):
     found = search(designs, [], OBJECTIVES["peak_tension"], OPTIONS, 20, said.append)
     assert found.refused and "not acceptable: patient 1: the step fell below its least size." in said
     assert 0.139 <= found.x[0] < 0.15 and found.value < found.start
+
+
+def test_a_step_to_a_device_that_does_not_do_the_exercise_is_not_acceptable(monkeypatch):
+    class Lagging:
+        """In place of a run: 1 deg off, and 3 where the guide is nearer than 0.139 m, which the objective asks for."""
+
+        def __init__(self, wearer, designs, x, options):
+            self.x, self.tension, self.off = x, 100.0, 1.0 if x[0] > 0.139 else 3.0
+
+        def gradient(self, objective):
+            return float(self.x[0]), np.ones(1)
+
+    monkeypatch.setattr(module, "Trial", Lagging)
+    said: list[str] = []
+    designs = space(bounds={"guide_distance": (0.1, 0.19)})
+    found = search(designs, few(1), OBJECTIVES["motor_power"], OPTIONS, 20, said.append)
+    assert any("patient 1: the elbow is 3 deg rms off" in sentence for sentence in said)
+    assert 0.139 < found.x[0] < 0.15 and found.refused
+
+
+@pytest.mark.parametrize(
+    ("iterations", "beyond", "ending"),
+    [(30, 0.0, "It converged"), (1, 0.0, "The iterations are spent"), (30, 0.1599, "The line search found no")],
+)
+def test_the_reason_of_the_end_is_told(iterations, beyond, ending, monkeypatch):
+    monkeypatch.setattr(module, "mean_gradient", bowl(fails=lambda x: x < beyond))
+    found = search(space(bounds={"guide_distance": (0.1, 0.19)}), [], OBJECTIVES["peak_tension"], OPTIONS, iterations)
+    assert found.ending.startswith(ending)
 
 
 def test_a_run_that_fails_today_is_an_error(monkeypatch):
@@ -90,7 +118,7 @@ def test_progress_is_told_for_each_iteration(monkeypatch):
 def test_an_objective_that_hardly_depends_on_the_design_is_lowered_too(monkeypatch):
     """A thousandth is there to be gained: a first step as long as the slope would end the search where it began."""
 
-    def mean_gradient(designs, who, objective, options, x):
+    def mean_gradient(designs, who, objective, options, acceptance, x):
         return 2.0 * (x[0] - 0.14) ** 2 + 1.0, 4.0 * (x - 0.14)
 
     monkeypatch.setattr(module, "mean_gradient", mean_gradient)

@@ -43,6 +43,24 @@ def test_without_bounds_rope_ends_guide_and_cuff_may_move():
     assert softer.cuff is not None and softer.cuff.stiffness[0] == pytest.approx(0.5 * Cuff().stiffness[0])
 
 
+def test_bounds_that_nobody_gave_are_clipped_to_what_a_device_can_have():
+    device = Exoskeleton.named("elbow")
+    near = DesignSpace(Design(device.changed(guide_distance=0.025)))
+    # Within a hundredth of the reach of 30 mm.
+    assert 0.0 < near.low[near.names.index("guide_distance")] < 3e-4
+    assert near.high[near.names.index("guide_distance")] == pytest.approx(0.055)
+    far = DesignSpace(Design(device.changed(guide_distance=0.59)))
+    assert 0.5997 < far.high[far.names.index("guide_distance")] <= 0.6
+    # A horn of 3 cm: a bound 30 mm off would let the rope turn the elbow the other way.
+    horn = DesignSpace(Design(device.changed(agonist={"lower": (0.0127, -0.0272, 0.05)})))
+    assert set(horn.names) == set(near.names) and (horn.low < horn.start).all() and (horn.start < horn.high).all()
+    k = horn.names.index("ropes.agonist.lower.0")
+    assert horn.low[k] > horn.start[k] - 0.0299
+    # At the limit itself the number may move one way only.
+    edge = DesignSpace(Design(device.changed(guide_distance=0.6)))
+    assert edge.high[edge.names.index("guide_distance")] == 0.6
+
+
 def test_a_rope_whose_name_holds_dots():
     device = Exoskeleton.named("elbow")
     ropes = {"left.2": device.ropes["agonist"].model_dump(), "right": device.ropes["antagonist"].model_dump()}
@@ -60,6 +78,7 @@ def test_a_rope_whose_name_holds_dots():
         ({"cuff.stiffness.0": (1, 1e4)}, "only with a compliant cuff"),
         ({"guide_distance": (0.2, 0.1)}, "expected a least value below the largest"),
         ({"guide_distance": (0.16, 0.16)}, "expected a least value below the largest"),
+        ({"guide_distance": (0.16, 0.1600001)}, "largest, by at least 1e-06"),
         ({"guide_distance": (0.17, 0.2)}, "expected bounds with today's value, 0.16, between them"),
         ({"guide_distance": (-0.1, 0.2)}, "guide_distance = -0.1: .*a number above 0"),
         (
