@@ -19,6 +19,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import exo_env  # noqa: F401  registers
 from exo_env.gradients.torch_functions import ControlPeriod
 
+if sys.argv[1:] in (["-h"], ["--help"]):
+    sys.exit(__doc__)
 SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 6.0
 TRAINED, OTHERS = range(4), range(100, 104)
 SEEN = ["device.angle", "device.rate", "device.reference", "device.reference_rate"]

@@ -62,7 +62,9 @@ class HiddenIntentEnv(AssistanceEnv):
     device knows, and there is none.
 
     ## Observation Space
-    `Box`, float32, of the groups in `observation`. "device", the default, has no reference and no clock:
+    `Box`, float32, of the groups in `observation`. An observation times its scale is the reading in its unit; least and
+    greatest are those of observations. Angles and moments are positive where they flex the elbow; the device's moment
+    on it counts alike. "device", the default, has no reference and no clock:
 
     | Num | Observation           | Min  | Max | Unit  | Scale |
     |-----|-----------------------|------|-----|-------|-------|
@@ -75,8 +77,10 @@ class HiddenIntentEnv(AssistanceEnv):
     | 6   | last_action, second   | -1   | 1   | -     | 1     |
 
     "estimated" is what a Kalman filter in the device makes of angle, rate and guide force: the moment of all but the
-    device, that of the muscles, the intended one, load and effort, each with its standard deviation
-    (`exo_env/tasks/observation/estimates.py`); without EMG it cannot tell muscles from load, and says so. "emg" has six
+    device, that of the muscles, the intended one, load and effort, each followed by its standard deviation
+    (`exo_env/tasks/observation/estimates.py`; `env.unwrapped.summary()` tells places and scales). It cannot tell
+    muscles from load, and says so; its effort is a share of an average man's strength and not the patient's will, which
+    `info["effort"]` is. "emg" has six
     envelopes with unknown gains, crosstalk, delay, noise, channels that drop out and electrodes that are
     put on anew (`exo_env/tasks/observation/electrodes.py`); "imu" the forearm's rate and specific force; "privileged"
     the patient's traits, true states and the plan; "clock" the time since the episode began, which no worn device knows
@@ -87,7 +91,7 @@ class HiddenIntentEnv(AssistanceEnv):
 
     | Term       | Value                                                                      | Weight |
     |------------|----------------------------------------------------------------------------|--------|
-    | tracking   | exp(-(angle from what the patient wants / 5 deg)^2)                        | 1      |
+    | tracking   | exp(-(angle from what the patient wants / 10 deg)^2)                       | 1      |
     | assistance | -(moment of the device beyond need) / need, at least -2                    | 0.75   |
     | smoothness | -mean square change of the action / 4                                      | 0.2    |
     | reaction   | -(elbow reaction / 500 N - 1) beyond 500 N, at least -2                    | 0.2    |
@@ -112,7 +116,8 @@ class HiddenIntentEnv(AssistanceEnv):
     anew midway.
 
     ## Version History
-    * v0: first version
+    * v0: first version. Since 0.3.0 the width of the tracking term is 10 deg (5 before) and patients hold more stiffly
+      under load; returns before and after cannot be compared.
     """
 
     task_type: ClassVar[type[Task]] = HiddenIntentTask

@@ -146,12 +146,12 @@ class Task(ABC):
         Args:
             structure: parts of the observation, see `AssistanceEnv.observation_structure`.
         """
-        lines = [f"{type(self).__name__}", "", f"{'reward term':36}{'weight':>10}"]
-        lines += [f"{name:36}{getattr(self.weights, name):10.4g}" for name in self.terms]
-        lines += ["", f"{'observed channel':36}{'place':>10}{'unit':>8}{'scale':>8}"]
+        lines = [f"{type(self).__name__}", "", f"{'reward term':44}{'weight':>9}"]
+        lines += [f"{name:44}{getattr(self.weights, name):9.4g}" for name in self.terms]
+        lines += ["", f"{'observed channel':44} {'place':>8} {'unit':>9} {'scale':>7}"]
         for part in structure:
             place = str(part.start) if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
-            lines.append(f"{part.group + '.' + part.name:36}{place:>10}{part.unit:>8}{part.scale:8.4g}")
+            lines.append(f"{part.group + '.' + part.name:44} {place:>8} {part.unit:>9} {part.scale:7.4g}")
         lines += ["", "actions: " + ", ".join(self.parts.actions), "ends with: " + ", ".join((*self.events, "solver"))]
         return "\n".join(lines)
 

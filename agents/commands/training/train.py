@@ -78,7 +78,7 @@ def _outlook(steps: int, end: int, planned: int) -> Iterator[str]:
     if steps > 0:
         yield f"going on after {steps} steps"
     if end > planned:
-        yield f"whole rounds end after {end} steps, not {planned}"
+        yield f"rounds are not cut short: the training ends after {end} steps, not {planned}"
 
 
 @contextlib.contextmanager

@@ -247,7 +247,7 @@ def test_what_is_ahead_is_said_where_it_is_not_what_was_asked_for(tmp_path, caps
     path, out = config_file(tmp_path), tmp_path / "run"
     assert train("--config", path, "--out", out, "--set", "n_timesteps=40") == 0
     printed = capsys.readouterr().out
-    assert "whole rounds end after 64 steps, not 40" in printed and "64 steps in" in printed
+    assert "the training ends after 64 steps, not 40" in printed and "64 steps in" in printed
     assert train("--resume", out) == 0
     assert "already complete: 64 of 40 steps" in capsys.readouterr().out
     assert train("--resume", out, "--set", "n_timesteps=96") == 0
