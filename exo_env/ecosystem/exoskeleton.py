@@ -191,6 +191,11 @@ class Exoskeleton(Settings):
         """Moment that holds the lower link at a hinge angle [rad] [Nm]; gravity in m/s^2."""
         return link_moment(self.lower_link.numbers(), angle, gravity)
 
+    def own_inertia(self) -> float:
+        """Of the lower link about the hinge [kg m^2]."""
+        link = self.lower_link
+        return link.inertia[2] + link.mass * float(np.sum(np.square(link.centre_of_mass[:2])))
+
 
 def shipped_devices() -> list[str]:
     """Names of the devices in configs/exoskeletons."""

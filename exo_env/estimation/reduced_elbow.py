@@ -102,8 +102,7 @@ def reduced_elbow(
     t, device = tuning or ReducedTuning(), ecosystem.device
     nominal = ecosystem.changed(person=(person or Person()).model_dump())
     arm = nominal.arm()
-    link = device.lower_link
-    own, of_link = arm.inertia_about_elbow(), link.inertia[2] + link.mass * np.sum(np.square(link.centre_of_mass[:2]))
+    own, of_link = arm.inertia_about_elbow(), device.own_inertia()
     inertia = own + of_link
     by_net, disturbance = _over_a_period(period, t.net_time, inertia)
     machine = ecosystem.machine

@@ -55,9 +55,9 @@ class Known:
     @cached_property
     def inertia(self) -> float:
         """Of forearm, hand, handle and lower link about the elbow [kg m^2]: a rigid arm's, the same at all angles."""
-        link, model = self.ecosystem.device.lower_link, self._model(0.0)
+        model = self._model(0.0)
         turned, still = (needed_moment(model.arm, model.load, MIDDLE, 0.0, x) for x in (1.0, 0.0))
-        return float(turned - still + link.inertia[2] + link.mass * np.sum(np.square(link.centre_of_mass[:2])))
+        return float(turned - still + self.ecosystem.device.own_inertia())
 
     @cached_property
     def muscles(self) -> np.ndarray:
