@@ -18,8 +18,7 @@ from pydantic import Field
 
 from dms_core import Model
 from dms_core.errors import SimulationError
-from dms_core.model import RopeSensor, Spline, System
-from dms_core.model.muscles.activation import MINIMUM
+from dms_core.model import RopeSensor, System
 from exo_env.design.space import Design
 from exo_env.ecosystem.ecosystem import Ecosystem, Proprioception
 from exo_env.ecosystem.subject import DEFAULT, AnySubject, read_subject
@@ -83,12 +82,10 @@ class Wearer:
             raise SimulationError(f"{self.name}: {error}") from None
 
     @cached_property
-    def _excitations(self) -> dict[str, Spline]:
-        """What is left of the command to each muscle."""
-        p, arm = self.patient, self._ecosystem.arm()
-        most = np.where(arm.signs > 0.0, p.maximum_activation_flexors, p.maximum_activation_extensors)
-        scaled, times = np.maximum(most * self._command.activations, MINIMUM), tuple(self._command.times)
-        return {m: Spline(times=times, values=tuple(scaled[:, k])) for k, m in enumerate(self._command.muscles)}
+    def _most(self) -> np.ndarray:
+        """Maximum activation of each muscle [-]."""
+        p, signs = self.patient, self._ecosystem.arm().signs
+        return np.where(signs > 0.0, p.maximum_activation_flexors, p.maximum_activation_extensors)
 
     def system(self, design: Design) -> System:
         """The patient in a device, with sensors of all that objectives need.
@@ -100,8 +97,8 @@ class Wearer:
         declared = worn.system(
             float(np.radians(self.exercise.angles_deg[0])),
             self.exercise.reference,
-            self._excitations,
-            start_activation={m: spline.values[0] for m, spline in self._excitations.items()},
+            self._command.excitations(self._most),
+            start_activation=self._command.start_activation(self._most),
             muscle_times=self.patient.time_constants(worn.arm()),
         )
         rates = [RopeSensor(name=rate_sensor(r), rope=r, components=("rate",)) for r in design.device.ropes]

@@ -68,23 +68,23 @@ class MotorCommand:
     muscles: tuple[str, ...]
     """Names of the muscles, shape (m,)."""
 
-    def excitations(self, maximum: float) -> dict[str, Spline]:
+    def excitations(self, maximum: float | np.ndarray) -> dict[str, Spline]:
         """Excitation of each muscle over time.
 
         Args:
-            maximum: maximum activation of the subject, 0 to 1 [-].
+            maximum: maximum activation of the subject, or of each muscle, shape (m,), 0 to 1 [-].
 
         Raises:
             InputError: it is no number from 0 to 1.
         """
-        if not 0.0 <= maximum <= 1.0:
+        if not np.all((np.asarray(maximum) >= 0.0) & (np.asarray(maximum) <= 1.0)):
             raise InputError(f"maximum activation = {maximum}: expected a number from 0 to 1.")
         scaled = np.maximum(maximum * self.activations, MINIMUM)
         return {m: Spline(times=tuple(self.times), values=tuple(scaled[:, k])) for k, m in enumerate(self.muscles)}
 
-    def start_activation(self, maximum: float) -> dict[str, float]:
-        """Activation of each muscle at the start [-], at a maximum activation of 0 to 1."""
-        return {m: float(max(maximum * self.activations[0, k], MINIMUM)) for k, m in enumerate(self.muscles)}
+    def start_activation(self, maximum: float | np.ndarray) -> dict[str, float]:
+        """Activation of each muscle at the start [-], at a maximum activation as in `excitations`."""
+        return dict(zip(self.muscles, np.maximum(maximum * self.activations[0], MINIMUM).tolist(), strict=True))
 
 
 @dataclass(frozen=True)

@@ -120,3 +120,9 @@ def test_scaling(command):
     assert set(command.excitations(0.0)["BRA"].values) == {0.01}
     with pytest.raises(InputError, match="maximum activation = 1.5"):
         command.excitations(1.5)
+    most = np.linspace(0.2, 1.0, len(command.muscles))
+    for k, (name, curve) in enumerate(command.excitations(most).items()):
+        assert curve == command.excitations(float(most[k]))[name]
+        assert command.start_activation(most)[name] == curve.values[0]
+    with pytest.raises(InputError, match="from 0 to 1"):
+        command.excitations(np.where(most < 1.0, most, np.nan))
