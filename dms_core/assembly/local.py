@@ -124,10 +124,13 @@ def add_dynamic_rows(x, e, n):
 
 
 @compiled(forceinline=True)
-def add_solved_rows(x, e):
+def add_solved_rows(x, e, n):
     """As add_dynamic_rows, of the coordinates that are solved for alone."""
-    start = x.iq_ptr[e]
-    for p in range(x.solved_ptr[e], x.solved_ptr[e + 1]):
+    start, first, end = x.iq_ptr[e], x.solved_ptr[e], x.solved_ptr[e + 1]
+    if end - first == n:
+        add_dynamic_rows(x, e, n)
+        return
+    for p in range(first, end):
         i = x.solved[p]
         x.r2[x.iq[start + i]] += x.r_l[i]
 
@@ -172,9 +175,12 @@ def add_constraint_forces(x, e, n):
 
 
 @compiled(forceinline=True)
-def put_solved_values(x, e):
+def put_solved_values(x, e, n):
     """As put_constraint_values; coordinates that are not solved for rest."""
     row, first, end = x.row[e], x.solved_ptr[e], x.solved_ptr[e + 1]
+    if end - first == n:
+        put_constraint_values(x, e, n)
+        return
     for k in range(x.row[e + 1] - row):
         rate = x.phi_t_l[k, 0]
         for p in range(first, end):
@@ -184,11 +190,14 @@ def put_solved_values(x, e):
 
 
 @compiled(forceinline=True)
-def add_solved_forces(x, e):
-    """As add_constraint_forces, of the coordinates that are solved for alone; each is loaded and stored once."""
-    start, row = x.iq_ptr[e], x.row[e]
+def add_solved_forces(x, e, n):
+    """As add_constraint_forces, of the coordinates that are solved for alone."""
+    start, row, first, end = x.iq_ptr[e], x.row[e], x.solved_ptr[e], x.solved_ptr[e + 1]
+    if end - first == n:
+        add_constraint_forces(x, e, n)
+        return
     m = x.row[e + 1] - row
-    for p in range(x.solved_ptr[e], x.solved_ptr[e + 1]):
+    for p in range(first, end):
         i = x.solved[p]
         at = x.iq[start + i]
         force, drift = x.r2[at], x.gmu[at]

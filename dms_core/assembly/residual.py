@@ -69,8 +69,8 @@ def evaluate_constraints(calls, w):
     """phi and phi_q v + phi_t of the rows that are solved for, without derivatives."""
     x = views(calls, w)
     for e in ints(calls, CALLS.moving):
-        evaluate_constraint(x, calls, e, w, 0)
-        put_solved_values(x, e)
+        n = evaluate_constraint(x, calls, e, w, 0)
+        put_solved_values(x, e, n)
 
 
 @compiled
@@ -80,28 +80,28 @@ def evaluate_residual(dynamics, constraints, w):
     x.r2[:] = 0.0
     x.gmu[:] = 0.0
     for e in ints(dynamics, CALLS.moving):
-        evaluate_dynamic(x, dynamics, e, w, 0)
-        add_solved_rows(x, e)
+        n = evaluate_dynamic(x, dynamics, e, w, 0)
+        add_solved_rows(x, e, n)
     y = views(constraints, w)
     for e in ints(constraints, CALLS.moving):
-        evaluate_constraint(y, constraints, e, w, 0)
-        put_solved_values(y, e)
-        add_solved_forces(y, e)
+        n = evaluate_constraint(y, constraints, e, w, 0)
+        put_solved_values(y, e, n)
+        add_solved_forces(y, e, n)
 
 
 @compiled(forceinline=True)
 def _dynamic_derivatives(x, calls, e, w):
     """Values of dynamic call e into the residual, its derivatives into the local arrays."""
-    evaluate_dynamic(x, calls, e, w, 1)
-    add_solved_rows(x, e)
+    n = evaluate_dynamic(x, calls, e, w, 1)
+    add_solved_rows(x, e, n)
 
 
 @compiled(forceinline=True)
 def _constraint_derivatives(x, calls, e, w):
     """Values and forces of constraint call e into the residual, its derivatives into the local arrays; gives n."""
     n = evaluate_constraint(x, calls, e, w, 1)
-    put_solved_values(x, e)
-    add_solved_forces(x, e)
+    put_solved_values(x, e, n)
+    add_solved_forces(x, e, n)
     return n
 
 

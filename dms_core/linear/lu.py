@@ -87,7 +87,7 @@ def factor(tables, a, work):
     return smallest, where
 
 
-@compiled
+@compiled(forceinline=True)
 def _line_up(tables, a):
     """Put behind the blocks: entries of L, entries of U over the pivot of their row, inverse pivots."""
     numbers, moves = _U(tables.numbers), tables.move.shape[0]
@@ -100,7 +100,7 @@ def _line_up(tables, a):
         a[numbers + _U(e)] = a[tables.place[e]] * a[pivots + (_U(tables.move[e]) >> _32)]
 
 
-@compiled(fastmath={"contract"})
+@compiled(fastmath={"contract"}, forceinline=True)
 def _solve_by_moves(tables, a, b, x, work):
     """As solve, one entry of L and U after the other."""
     numbers, moves = _U(tables.numbers), tables.move.shape[0]
@@ -119,7 +119,7 @@ def _solve_by_moves(tables, a, b, x, work):
         x[tables.col_of[k]] = work[k]
 
 
-@compiled(fastmath={"contract"})
+@compiled(fastmath={"contract"}, forceinline=True)
 def _solve_by_blocks(tables, a, b, x, work):
     """As solve, row by row."""
     n = tables.n

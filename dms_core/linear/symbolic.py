@@ -325,7 +325,8 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
     place = _positions(goal, source, slot, first, group)
     numbers = group.size * WIDTH
     # Unsigned indices spare the compiled loops numba's test for negative ones.
-    unsigned = [x.astype(np.uint32) for x in (slot, lane, first, diagonal, end, group, below, target)]
+    tables = (slot, lane, first, diagonal, end, group, below, target)
+    slot, lane, first, diagonal, end, group, below, target = (x.astype(np.uint32) for x in tables)
     return LuTables(
         n,
         -(-(numbers + (place.size + n if place.size else 0)) // WIDTH) * WIDTH + WIDTH,
@@ -336,7 +337,14 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
         position,
         np.asarray(row_perm).astype(np.uint32),
         np.asarray(col_perm).astype(np.uint32),
-        *unsigned,
+        slot,
+        lane,
+        first,
+        diagonal,
+        end,
+        group,
+        below,
+        target,
         lower,
         numbers,
         goal << 32 | source,

@@ -92,16 +92,16 @@ def apply(m, s, c0, x, factor):
 def correction_norm(m, s, c0):
     """Largest weighted component of the correction x in q and v, inf if any is not finite."""
     x, wq, wv, free = floats(s, STATE.x), floats(s, STATE.wq), floats(s, STATE.wv), naturals(m, MODEL.free)
-    n, largest, total = free.shape[0], 0.0, 0.0
+    n, largest = free.shape[0], 0.0
     for i in range(n):
-        by_q, by_v, k = abs(x[i]), abs(c0 * x[n + i]), free[i]
-        total += by_q + by_v
-        # A division takes as long as all else here.
-        if by_q > largest * wq[k]:
-            largest = by_q / wq[k]
-        if by_v > largest * wv[k]:
-            largest = by_v / wv[k]
-    return largest if total < math.inf else math.inf
+        # A division takes as long as all else here; what is no number fails the comparison, too.
+        if not abs(x[i]) <= largest * wq[free[i]]:
+            largest = abs(x[i]) / wq[free[i]]
+        if not abs(c0 * x[n + i]) <= largest * wv[free[i]]:
+            largest = abs(c0 * x[n + i]) / wv[free[i]]
+        if not largest < math.inf:
+            return math.inf
+    return largest
 
 
 @compiled
