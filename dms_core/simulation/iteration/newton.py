@@ -35,9 +35,9 @@ MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
 SLOW = 0.05
 """Contraction above which an old matrix is not worth keeping, and below which none is trusted before it is seen."""
-FADING = 0.01
-"""The same of SDIRK2, at most, times the stages since the matrix was made: one of a landing contracts by 0.001 to 0.015
-in the stage behind it, and by less and less from there."""
+FADING = 0.02
+"""The latter for SDIRK2, at most, over the stages since the matrix was made: one of a landing contracts by 0.001 to
+0.015 in the stage behind it, and by ten times that three stages later."""
 PREDICTED = 10.0
 """What is left of the constraint errors by a closing correction, at most, over what the one before it tells."""
 ROUNDING = 100.0
