@@ -4,10 +4,11 @@
 
 Parts of the solver are counted and timed where they are called, by the processor's cycle counter: each is called by its
 address (dms_core/simulation/iteration/parts.py), which is replaced by that of a function that counts, times and calls
-it. What a part calls in turn is taken off, so that "Newton's method" is what is left of a stage without its residuals.
-What comes before and behind the solver is timed in a loop of its own, and what Python does by steps whose period is
-left out; both in CPU time. Calls that another program interrupted, longer than a millisecond, count with the mean of
-the others. Actions are those that a policy tries in training (env_speed.py). The sum of all rows is printed beside
+it; the compiled period as a whole likewise. What a part calls in turn is taken off, so that "Newton's method" is what
+is left of a stage without its residuals. What comes before and behind the solver is timed in loops of its own, in CPU
+time; within a step it is slower, as the processor meets it cold, and by how much is a row. What Python does is the CPU
+time of a step less the compiled period. Calls that another program interrupted, longer than a millisecond, count with
+the mean of the others. Actions are those that a policy tries in training. The sum of all rows is printed beside
 env.step as a whole, which is timed without counters.
 """
 
@@ -17,7 +18,6 @@ import argparse
 import statistics
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,7 +39,7 @@ from exo_env.envs import base_env
 from exo_env.envs.base_env import AssistanceEnv
 from exo_env.envs.elbow_lift import ElbowLiftEnv
 from exo_env.envs.hidden_intent import HiddenIntentEnv
-from exo_env.tables import PATIENT_TABLES, STATUS, WORLD
+from exo_env.tables import PATIENT_TABLES, WORLD
 from exo_env.world.kernels import control_period
 from exo_env.world.kernels.observe import observe
 from tests.benchmarks import csv_file
@@ -135,11 +135,32 @@ def _timed(target: int, signature: Any, call: Any, table: int, k: int, longest: 
     return address(njit(error_model="numpy")(known["timed"]), signature)
 
 
+def _timed_period(table: int, k: int, longest: float) -> Any:
+    """The compiled control period, noted in row k of the counts."""
+    run_period = control_period.run_period
+
+    @njit(error_model="numpy")
+    def timed(w, action):  # noqa: ANN001, ANN202
+        counts = floats(table_at(table, 1), 0)
+        begin = cycles()
+        code = run_period(w, action)
+        spent = 1.0 * (cycles() - begin)
+        if spent < longest:
+            counts[3 * k] += 1.0
+            counts[3 * k + 1] += spent
+        else:
+            counts[3 * k + 2] += 1.0
+        return code
+
+    return timed
+
+
 class Counters:
     """Counts and times the parts of the solver of a world from now on."""
 
     def __init__(self, world: World) -> None:
-        self.scale, self._found = cycles_per_us(), np.zeros(3 * len(PARTS))
+        # A row a part, and a last one for the whole period.
+        self.scale, self._found = cycles_per_us(), np.zeros(3 * len(PARTS) + 3)
         self._table = np.array([[self._found.ctypes.data, self._found.size, 1]], np.int64)
         own, longest = world.state.parts, LONGEST * 1e6 * self.scale
         calls = {
@@ -153,14 +174,22 @@ class Counters:
                 signature, call = calls.get(name, (PART, call_part))
                 self._parts[k] = _timed(int(own[k]), signature, call, int(self._table.ctypes.data), k, longest)
         world.packed.table[STATE.parts, 0] = self._parts.ctypes.data
+        self.period = _timed_period(int(self._table.ctypes.data), len(PARTS), longest)
+        """In place of `run_period`."""
 
     def reset(self) -> None:
         """Begin anew."""
         self._found[:] = 0.0
 
+    @property
+    def period_us(self) -> float:
+        """Mean time of a compiled period [us]."""
+        calls, spent, _ = self._found[-3:]
+        return float(spent / calls / self.scale)
+
     def parts(self, periods: int) -> list[Part]:
         """A row a part, what it calls in turn taken off."""
-        counts = self._found.reshape(-1, 3)
+        counts = self._found.reshape(-1, 3)[:-1]
         mean = {n: c[1] / c[0] / self.scale if c[0] else 0.0 for n, c in zip(Parts._fields, counts, strict=True)}
         calls = {n: (c[0] + c[2]) / periods for n, c in zip(Parts._fields, counts, strict=True)}
         rows = []
@@ -224,44 +253,33 @@ def run(env: AssistanceEnv, actions: np.ndarray) -> float:
     return total / len(actions) * 1e6
 
 
-def python_around(env: AssistanceEnv, actions: np.ndarray) -> float:
-    """CPU us of a step whose compiled period is left out."""
-    status, period = env.world.tables.status, base_env.run_period
-
-    def nothing(table: np.ndarray, action: np.ndarray) -> int:
-        status[STATUS.step] += 1
-        return int(base_env.DONE)
-
-    try:
-        base_env.run_period = nothing
-        return run(env, actions)
-    finally:
-        base_env.run_period = period
-
-
 def profile(name: str, steps: int, repeats: int) -> tuple[list[Part], float]:
     """Rows of one environment, and env.step as a whole [us]."""
     kind, mode, _ = ENVS[name]
     env, actions = kind(action_mode=mode), actions_of(name, steps)
     run(env, actions[: steps // 4])
-
-    def median(of: Callable[..., float]) -> float:
-        return statistics.median(of(env, actions) for _ in range(repeats))
-
-    whole, table = median(run), env.world.packed.table
-    rows = [
-        Part("Python around the compiled period", 1.0, median(python_around)),
+    whole, table = statistics.median(run(env, actions) for _ in range(repeats)), env.world.packed.table
+    around = [
         Part("commands of drive and patient", 1.0, _loop(_command, table, repeats)),
         Part("sensors and readings", 1.0, _loop(_read, table, repeats)),
         Part("observation and reward", 1.0, _loop(_show, table, repeats)),
     ]
     env.reset(seed=0)
-    counters = Counters(env.world.dynamics)
-    run(env, actions[: steps // 4])
-    counters.reset()
-    # The whole run again, resets included, whose few calls of the solver hardly count.
-    run(env, actions)
-    return rows + counters.parts(steps), whole
+    counters, period = Counters(env.world.dynamics), base_env.run_period
+    try:
+        base_env.run_period = counters.period
+        run(env, actions[: steps // 4])
+        counters.reset()
+        # The whole run again, resets included, whose few calls of the solver hardly count.
+        counted = run(env, actions)
+    finally:
+        base_env.run_period = period
+    parts, compiled = counters.parts(steps), counters.period_us
+    cold = compiled - sum(r.us for r in parts) - sum(r.us for r in around)
+    return [
+        Part("Python around the compiled period", 1.0, counted - compiled), *around,
+        Part("what these take longer within a step", 1.0, cold), *parts,
+    ], whole  # fmt: skip
 
 
 def main(arguments: list[str] | None = None) -> None:
