@@ -38,6 +38,8 @@ SLOW = 0.05
 FADING = 0.02
 """The latter for SDIRK2, at most, over the stages since the matrix was made: one of a landing contracts by 0.001 to
 0.015 in the stage behind it, and by ten times that three stages later."""
+LOOSE = 0.1
+"""`newton_tol` from which on that holds: with a smaller one, runs that differ by little are to do so smoothly."""
 PREDICTED = 10.0
 """What is left of the constraint errors by a closing correction, at most, over what the one before it tells."""
 ROUNDING = 100.0
@@ -226,7 +228,7 @@ def close_constraints(m, s, o, c0):
 @compiled
 def _trusted(s, o):
     """Contraction that a matrix is trusted to have at least before a second iteration has shown it."""
-    if o.method != METHOD.sdirk2:
+    if o.method != METHOD.sdirk2 or o.newton_tol < LOOSE:
         return SLOW
     return min(SLOW, FADING * max(ints(s, STATE.counts)[COUNTS.age], 1))
 
