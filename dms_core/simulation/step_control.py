@@ -272,12 +272,6 @@ def one_step(m, s, o, stop, kept):
         error = min(error, KEEPING)
     note_errors(s)
     accept(s, h, c0, started)
-    if h == rest:
-        land(s, stop)
-    # Methods without a past want rates between two landings only for a record.
-    wanted_rates = started if o.method == METHOD.bdf2 else kept or h == rest
-    if wanted_rates and not find_rates(m, s, o, c0 if h == rest and o.method == METHOD.sdirk2 else 0.0):
-        return OUTCOME.rates_failed
     if equal:
         clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
         if h == rest or not first_try:
@@ -290,17 +284,31 @@ def one_step(m, s, o, stop, kept):
         size = size_behind(m, s, o, h, error, iterations)
         # A step cut short by a landing says little about the size that the motion allows.
         clock[CLOCK.h_wanted] = max(size, wanted) if h < wanted and first_try else size
-    return OUTCOME.done
+    c0 = 0.0
+    if h == rest:
+        c0 = land(s, o, stop)
+    # Methods without a past want rates between two landings only for a record.
+    wanted_rates = started if o.method == METHOD.bdf2 else kept or h == rest
+    return OUTCOME.done if not wanted_rates or find_rates(m, s, o, c0) else OUTCOME.rates_failed
 
 
 @compiled
-def land(s, stop):
-    """Set the clock exactly; behind a jump of an input the method starts afresh."""
-    floats(s, STATE.clock)[CLOCK.t] = stop
+def land(s, o, stop):
+    """Set the clock exactly; behind a jump of an input the method starts afresh.
+
+    Gives c0 of the next steps of SDIRK2, for which a matrix is made where they begin, if the next landing is as far off
+    as this one was from the last; 0 for another method.
+    """
+    clock = floats(s, STATE.clock)
+    span, clock[CLOCK.landed], clock[CLOCK.t] = stop - clock[CLOCK.landed], stop, stop
     jumps = floats(inner(s, STATE.signals), SIGNALS.jumps)
     for k in range(jumps.shape[0]):
         if jumps[k] == stop:
             ints(s, STATE.counts)[COUNTS.restart] = 1
+    if o.method != METHOD.sdirk2:
+        return 0.0
+    h = o.fixed_step if o.fixed_step > 0.0 else min(clock[CLOCK.h_wanted], o.h_max)
+    return 1.0 / (GAMMA * landing_size(h, span, o.fixed_step > 0.0, o.fixed_step <= 0.0 and span <= NEAR * h))
 
 
 @compiled
