@@ -38,9 +38,10 @@ from tests.benchmarks.peers.exudyn_chain import PROGRAM, SOLVERS, settings
 from tests.benchmarks.peers.record import Row, parser, row, save
 
 NODES = {"linear": 2, "quadratic": 3}
-BEAM_STEPS, CRANK_STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4), (4e-4, 2e-4, 1e-4, 5e-5)
+BEAM_STEPS, CRANK_STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4), (4e-4, 2e-4, 1e-4, 5e-5)
 """Fixed steps [s]."""
-ROD_ELEMENTS = (4, 8, 16)
+ROD_ELEMENTS = (4, 8)
+"""With 16, generalized-alpha hardly converges at these steps: nothing damps the rod's stretching."""
 GROWTH_STEP = 1e-3
 Built = tuple[Any, int]
 """The assembled system and the node whose place is compared."""
