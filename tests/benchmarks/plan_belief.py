@@ -5,8 +5,9 @@
 
 An estimator of the plan sees `device` (plan_information.py, whose folder --runs is). Its estimates stand in for the
 plan in a policy that was trained to be told it (certainty equivalence); then the estimator goes on with episodes that
-this policy drove; then PPO learns on `device` and the estimates, by the recipe ppo.yml with half of its steps, and goes
-on once the estimator has seen that policy's episodes. All act on the 60 patients of docs/ablations.csv.
+this policy drove. A soft PD on the estimate is tuned (estimate_pd.py). PPO learns on `device` and the estimates, by the
+recipe ppo.yml with half of its steps, and goes on once the estimator has seen that policy's episodes. All act on the
+60 patients of docs/ablations.csv. What was done is kept in --runs, from which the same command goes on.
 """
 
 from __future__ import annotations
@@ -28,9 +29,11 @@ from agents.environment import patient_seeds
 from agents.evaluation.comparison.gap import gap_closed
 from agents.evaluation.comparison.statistics import estimate, interquartile_mean
 from agents.policies.learned import find_policy
+from exo_env.tasks.judgement.intent_rewards import INTENT_WIDTH
 from tests.benchmarks import csv_file
 from tests.benchmarks.belief_learning import BeliefLearning
 from tests.benchmarks.believer import Believer
+from tests.benchmarks.estimate_pd import searched
 from tests.benchmarks.plan_episodes import NOBODY, TARGETS, Driver, Episodes, record
 from tests.benchmarks.plan_estimator import PlanEstimator, Schooling, train
 from tests.benchmarks.plan_information import (
@@ -43,6 +46,9 @@ from tests.benchmarks.plan_information import (
     places_of,
 )
 
+TRIES = ("certainty", "cautious", "learning")
+SEARCHED = 24
+"""Tries of a search, with 40 training patients each."""
 SEED, PATIENTS = 7, 60
 TOLD = tuple(
     TARGETS.index(x) for x in ("intent", "intent_rate", "intent in 0.1 s", "intent in 0.2 s", "intent in 0.4 s")
@@ -50,7 +56,7 @@ TOLD = tuple(
 """What the policy that is told the plan sees of it, in its order."""
 COLUMNS = (
     "policy", "return", "return_low", "return_high", "gap_closed", "gap_closed_low", "gap_closed_high",
-    "tracking_rms_deg", "estimate_rms_deg", "unsafe",
+    "tracking_rms_deg", "estimate_rms_deg", "unsafe", "return_mean", "tracking", "tracking_if_there",
 )  # fmt: skip
 
 
@@ -92,11 +98,12 @@ def measured(name: str, test: Episodes, against: Mapping[str, Episodes], told: n
     gap = gap_closed(as_episodes[""], as_episodes["mean_angle"], as_episodes["oracle"], SEED)
     returns = estimate(test.returns, interquartile_mean, np.random.default_rng(SEED))
     angle = test.seen[..., places_of(["privileged.elbow"])[0]]
-    wrong = [np.degrees(rms(angle - test.plan[..., 0], test.running))]
-    wrong.append(float("nan") if told is None else np.degrees(rms(told - test.plan[..., 0], test.running)))
+    answers = [angle, told if told is not None else np.full_like(angle, np.nan)]
+    wrong = [np.degrees(rms(x - test.plan[..., 0], test.running)) for x in answers]
     return [
         name, returns.value, returns.low, returns.high, gap["value"], gap["low"], gap["high"], *wrong,
-        float(1.0 - test.running[:, -1].mean()),
+        float(1.0 - test.running[:, -1].mean()), float(test.returns.mean()),
+        *(earned(x - test.plan[..., 0], test.running) for x in answers),
     ]  # fmt: skip
 
 
@@ -104,6 +111,11 @@ def rms(error: np.ndarray, on: np.ndarray) -> float:
     """Interquartile mean over patients of the root mean square over time."""
     each = np.sqrt(np.sum(np.where(on, error**2, 0.0), axis=1) / on.sum(axis=1))
     return float(interquartile_mean(each))
+
+
+def earned(error: np.ndarray, on: np.ndarray) -> float:
+    """What errors [rad] earn for tracking, over what a whole episode earns at most."""
+    return float(np.where(on, np.exp(-((error / INTENT_WIDTH) ** 2)), 0.0).mean())
 
 
 def tested(driver: Driver) -> Episodes:
@@ -173,6 +185,12 @@ class Study:
         torch.save(found.state_dict(), path)
         return found, known
 
+    def cautious(self) -> None:
+        """A soft PD on the estimate, softer where that is unsure."""
+        driver, numbers = searched(self.first, SEARCHED, 40)
+        print(numbers)
+        self._add("PD on the estimate, tuned", driver)
+
     def learning(self) -> None:
         """PPO on `device` and the estimates, and on with a retrained estimator."""
         learning = BeliefLearning(self.first, self.steps, seed=0)
@@ -190,7 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=Path, required=True, help="folder of plan_information.py")
     parser.add_argument("--told", type=Path, required=True, help="training of the variation told_plan")
-    parser.add_argument("--tries", nargs="+", choices=("certainty", "learning"), default=["certainty", "learning"])
+    parser.add_argument("--tries", nargs="+", choices=TRIES, default=TRIES)
     parser.add_argument("--episodes", type=int, default=600, help="that each retraining of an estimator adds")
     parser.add_argument("--epochs", type=int, default=8, help="of each retraining")
     parser.add_argument("--steps", type=int, default=1_500_000, help="of PPO")
