@@ -1,10 +1,10 @@
 """A soft PD on an estimate of the plan, softer where the estimate is unsure; its numbers are searched for.
 
-    M = share of the arm's weight + c (stiffness (psi^ - theta) + damping psi^') - damping theta',
+    M = weight(theta) + c (stiffness (psi^ - theta) + damping psi^') - damping theta' + integral int c (psi^ - theta) dt
     c = 1 / (1 + (s / s0)^2)
 
 with the estimate psi^, its rate and its standard deviation s. It is the PD on the mean angle (mean_movement.py) with
-what is believed in place of the mean.
+what is believed in place of the mean, and the oracle's integral, which forgets and is for those who do not get there.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import numpy as np
 
 from agents.environment import HIDDEN_PLAN, make, patient_seeds
 from agents.policies.reference_free.assist_moment import AssistMoment, Seen
+from agents.policies.reference_free.oracle import FORGETTING
 from tests.benchmarks.believer import Believer
 from tests.benchmarks.plan_episodes import SETTINGS, TARGETS, record
 from tests.benchmarks.plan_estimator import PlanEstimator
 
 RANGES = {
-    "stiffness": (1.0, 40.0), "damping": (0.3, 6.0), "s0_deg": (3.0, 40.0), "share": (0.02, 0.6),
-    "smoothing": (0.01, 0.1),
+    "stiffness": (0.5, 20.0), "integral": (0.5, 60.0), "damping": (0.3, 3.0), "s0_deg": (3.0, 40.0),
+    "share": (0.02, 0.3), "carried": (0.02, 0.6), "smoothing": (0.01, 0.1),
 }  # fmt: skip
 """Least and largest value of each number, drawn evenly in the logarithm."""
 SEARCH_SEED = 1510
@@ -39,7 +40,7 @@ class EstimatePd(AssistMoment):
     name, title = "estimate_pd", "PD on the estimated plan"
 
     def __init__(self, estimator: PlanEstimator, numbers: Mapping[str, float]) -> None:
-        self.numbers = {**numbers, "carried": 0.0}
+        self.numbers = dict(numbers)
         self._believer, self._env = Believer(estimator), make(HIDDEN_PLAN, **SETTINGS)
         self._scale = estimator.plan_scale[0].item()
 
@@ -47,6 +48,7 @@ class EstimatePd(AssistMoment):
         """Begin an episode in each world."""
         super().begin(self._env, worlds)
         self._believer.begin()
+        self._sum = np.zeros(worlds)
         self.told: list[np.ndarray] = []
 
     def wanted(self, observations: np.ndarray, seen: Seen) -> np.ndarray:
@@ -56,8 +58,10 @@ class EstimatePd(AssistMoment):
         self.told.append(psi)
         deviation = self._scale * np.exp(0.5 * belief.log_variance[:, 0])
         sure = 1.0 / (1.0 + (deviation / np.radians(x["s0_deg"])) ** 2)
-        towards = sure * (x["stiffness"] * (psi - seen.angle) + x["damping"] * rate)
-        return self.weight(seen.angle) + towards - x["damping"] * seen.rate
+        error = sure * (psi - seen.angle)
+        self._sum = self._sum + self.period * error - self.kept(FORGETTING) * self._sum
+        towards = x["stiffness"] * error + x["damping"] * (sure * rate - seen.rate) + x["integral"] * self._sum
+        return self.weight(seen.angle) + towards
 
 
 def searched(estimator: PlanEstimator, tries: int, patients: int) -> tuple[EstimatePd, dict[str, float]]:

@@ -47,8 +47,8 @@ from tests.benchmarks.plan_information import (
 )
 
 TRIES = ("certainty", "cautious", "learning")
-SEARCHED = 24
-"""Tries of a search, with 40 training patients each."""
+SEARCHED = (24, 24)
+"""Tries of a search, and training patients of each."""
 SEED, PATIENTS = 7, 60
 TOLD = tuple(
     TARGETS.index(x) for x in ("intent", "intent_rate", "intent in 0.1 s", "intent in 0.2 s", "intent in 0.4 s")
@@ -187,7 +187,7 @@ class Study:
 
     def cautious(self) -> None:
         """A soft PD on the estimate, softer where that is unsure."""
-        driver, numbers = searched(self.first, SEARCHED, 40)
+        driver, numbers = searched(self.first, *SEARCHED)
         print(numbers)
         self._add("PD on the estimate, tuned", driver)
 
