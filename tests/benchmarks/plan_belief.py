@@ -31,10 +31,10 @@ from agents.evaluation.comparison.statistics import estimate, interquartile_mean
 from agents.policies.learned import find_policy
 from exo_env.tasks.judgement.intent_rewards import INTENT_WIDTH
 from tests.benchmarks import csv_file
-from tests.benchmarks.belief_learning import BeliefLearning
+from tests.benchmarks.belief_learning import TOLD, BeliefLearning
 from tests.benchmarks.believer import Believer
 from tests.benchmarks.estimate_pd import searched
-from tests.benchmarks.plan_episodes import NOBODY, TARGETS, Driver, Episodes, record
+from tests.benchmarks.plan_episodes import NOBODY, Driver, Episodes, record
 from tests.benchmarks.plan_estimator import PlanEstimator, Schooling, train
 from tests.benchmarks.plan_information import (
     DISTURBANCE,
@@ -46,14 +46,10 @@ from tests.benchmarks.plan_information import (
     places_of,
 )
 
-TRIES = ("certainty", "cautious", "learning")
+TRIES = ("certainty", "cautious", "learning", "tuning", "tuning_retrained")
 SEARCHED = (24, 24)
 """Tries of a search, and training patients of each."""
 SEED, PATIENTS = 7, 60
-TOLD = tuple(
-    TARGETS.index(x) for x in ("intent", "intent_rate", "intent in 0.1 s", "intent in 0.2 s", "intent in 0.4 s")
-)
-"""What the policy that is told the plan sees of it, in its order."""
 COLUMNS = (
     "policy", "return", "return_low", "return_high", "gap_closed", "gap_closed_low", "gap_closed_high",
     "tracking_rms_deg", "estimate_rms_deg", "unsafe", "return_mean", "tracking", "tracking_if_there",
@@ -201,6 +197,21 @@ class Study:
         self._add("the same, estimator retrained", learning.driver())
         learning.learn(self.steps // 2)
         self._add("PPO gone on with it", learning.driver())
+
+    def tuning(self) -> None:
+        """PPO that begins with the policy that was told the plan, and sees what the estimator believes instead."""
+        self._tuned("PPO that begins with told_plan", self.first)
+
+    def tuning_retrained(self) -> None:
+        """The same with the estimator of the last round of certainty equivalence, which has to be done before."""
+        one = copy.deepcopy(self.first)
+        one.load_state_dict(torch.load(self.runs / "belief_2.pt", weights_only=True))
+        self._tuned("PPO that begins with told_plan, estimator retrained twice", one)
+
+    def _tuned(self, name: str, one: PlanEstimator) -> None:
+        learning = BeliefLearning(one, self.steps // 2, seed=0, told=find_policy(str(self.told)))  # type: ignore[arg-type]
+        learning.learn(self.steps // 2)
+        self._add(name, learning.driver())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
