@@ -1,6 +1,7 @@
 """Policies that act on an estimate of the plan: what tests/benchmarks/plan_belief.py is made of, at a tiny size."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ pytest.importorskip("sb3_contrib")
 import torch
 
 from agents.environment import HIDDEN_PLAN, patient_seeds
+from agents.policies.network import Architecture, Network
 from agents.training.worlds import training_worlds
+from agents.training.wrappers.low_pass import kept_shares
 from tests.benchmarks import plan_belief
-from tests.benchmarks.belief_learning import HIDDEN, BeliefObservations, shown
+from tests.benchmarks.belief_learning import HIDDEN, TOLD, BeliefLearning, BeliefObservations, shown
 from tests.benchmarks.believer import Believer
 from tests.benchmarks.estimate_pd import RANGES, EstimatePd
 from tests.benchmarks.plan_episodes import EVERY, TARGETS, record
@@ -54,6 +57,26 @@ def test_worlds_show_device_then_belief_then_all_else(estimator):
             last = infos[0]["terminal_observation"]
             assert last.shape == mine[0].shape and np.array_equal(last[device : device + BELIEF], held[0].astype("f4"))
     plain.close(), worlds.close()
+
+
+@pytest.mark.slow
+def test_learning_begins_as_the_policy_that_was_told_the_plan(estimator):
+    """Its first actions are those of that policy with the estimate as its plan, filtered observations included."""
+    device, rng = len(estimator.places), np.random.default_rng(0)
+    kept = kept_shares((0.1, 0.4, 1.6), 0.02)
+    inputs = (device + len(TOLD)) * (1 + len(kept))
+    shape = Architecture(inputs=inputs, traces=kept, hidden=(64, 64), activation="tanh", output="clip", normalised=True)
+    arrays = {name: 0.1 * rng.standard_normal(size) for name, size in shape.shapes().items()}
+    arrays["variance"] = 1.0 + arrays["variance"] ** 2
+    told = SimpleNamespace(arrays=arrays, description=SimpleNamespace(steps=1000))
+    driver = BeliefLearning(estimator, 9600, 0, told).driver()
+    network, believer = Network(shape, arrays), Believer(estimator)
+    driver.begin(3), network.reset(3), believer.begin()
+    for _ in range(5):
+        seen = rng.standard_normal((3, device)).astype(np.float32)
+        plan = believer.believe(seen).mean[:, list(TOLD)]
+        expected = network(np.concatenate([seen, plan], axis=1, dtype=np.float32))
+        assert np.allclose(driver.act(seen), expected, rtol=0, atol=1e-5)  # single precision of PyTorch
 
 
 def test_the_pd_pulls_towards_its_estimate_and_less_where_that_is_unsure(estimator):
