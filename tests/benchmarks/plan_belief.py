@@ -6,8 +6,9 @@
 An estimator of the plan sees `device` (plan_information.py, whose folder --runs is). Its estimates stand in for the
 plan in a policy that was trained to be told it (certainty equivalence); then the estimator goes on with episodes that
 this policy drove. A soft PD on the estimate is tuned (estimate_pd.py). PPO learns on `device` and the estimates, by the
-recipe ppo.yml with half of its steps, and goes on once the estimator has seen that policy's episodes. All act on the
-60 patients of docs/ablations.csv. What was done is kept in --runs, from which the same command goes on.
+recipe ppo.yml with half of its steps, and goes on once the estimator has seen that policy's episodes; and it begins
+with the policy that was told the plan. All act on the 60 patients of docs/ablations.csv. What was done is kept in
+--runs, from which the same command goes on.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from tests.benchmarks.plan_information import (
     places_of,
 )
 
-TRIES = ("certainty", "cautious", "learning", "tuning", "tuning_retrained")
+TRIES = ("certainty", "cautious", "learning", "tuning")
 SEARCHED = (24, 24)
 """Tries of a search, and training patients of each."""
 SEED, PATIENTS = 7, 60
@@ -200,18 +201,10 @@ class Study:
 
     def tuning(self) -> None:
         """PPO that begins with the policy that was told the plan, and sees what the estimator believes instead."""
-        self._tuned("PPO that begins with told_plan", self.first)
-
-    def tuning_retrained(self) -> None:
-        """The same with the estimator of the last round of certainty equivalence, which has to be done before."""
-        one = copy.deepcopy(self.first)
-        one.load_state_dict(torch.load(self.runs / "belief_2.pt", weights_only=True))
-        self._tuned("PPO that begins with told_plan, estimator retrained twice", one)
-
-    def _tuned(self, name: str, one: PlanEstimator) -> None:
-        learning = BeliefLearning(one, self.steps // 2, seed=0, told=find_policy(str(self.told)))  # type: ignore[arg-type]
+        told: Any = find_policy(str(self.told))
+        learning = BeliefLearning(self.first, self.steps // 2, seed=0, told=told)
         learning.learn(self.steps // 2)
-        self._add(name, learning.driver())
+        self._add("PPO that begins with told_plan", learning.driver())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
