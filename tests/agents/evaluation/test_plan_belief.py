@@ -1,4 +1,4 @@
-"""Policies that act on an estimate of the plan: what tests/benchmarks/plan_belief.py is made of, at a tiny size."""
+"""Policies that act on an estimate of the plan: tests/benchmarks/plan/plan_belief.py at a tiny size."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -14,13 +14,13 @@ from agents.environment import HIDDEN_PLAN, patient_seeds
 from agents.policies.network import Architecture, Network
 from agents.training.worlds import training_worlds
 from agents.training.wrappers.low_pass import kept_shares
-from tests.benchmarks import plan_belief
-from tests.benchmarks.belief_learning import HIDDEN, TOLD, BeliefLearning, BeliefObservations, shown
-from tests.benchmarks.believer import Believer
-from tests.benchmarks.estimate_pd import RANGES, EstimatePd
-from tests.benchmarks.plan_episodes import EVERY, TARGETS, record
-from tests.benchmarks.plan_estimator import PlanEstimator
-from tests.benchmarks.plan_information import places_of
+from tests.benchmarks.plan import plan_belief
+from tests.benchmarks.plan.belief_learning import HIDDEN, TOLD, BeliefLearning, BeliefObservations, shown
+from tests.benchmarks.plan.believer import Believer
+from tests.benchmarks.plan.estimate_pd import RANGES, EstimatePd
+from tests.benchmarks.plan.plan_episodes import EVERY, TARGETS, record
+from tests.benchmarks.plan.plan_estimator import PlanEstimator
+from tests.benchmarks.plan.plan_information import places_of
 
 SETTINGS = {
     "patient": "stroke_mild", "episode_duration": 0.4, "action_mode": "assist_moment",

@@ -1,4 +1,4 @@
-"""How much of the plan sensors show: tests/benchmarks/plan_information.py at a tiny size, and what it is made of."""
+"""How much of the plan sensors show: parts of tests/benchmarks/plan/plan_information.py, and all at a tiny size."""
 
 import csv
 
@@ -10,11 +10,11 @@ pytest.importorskip("sb3_contrib")
 import torch
 
 from agents.environment import patient_seeds
-from tests.benchmarks import plan_information
-from tests.benchmarks.believer import Believer
-from tests.benchmarks.plan_episodes import EVERY, NOBODY, TARGETS, Episodes, limits_of, record
-from tests.benchmarks.plan_estimator import PlanEstimator, Schooling, tell, train
-from tests.benchmarks.plan_information import COLUMNS, LIMIT_COLUMNS, TEST_SEED, elbow, places_of
+from tests.benchmarks.plan import plan_information
+from tests.benchmarks.plan.believer import Believer
+from tests.benchmarks.plan.plan_episodes import EVERY, NOBODY, TARGETS, Episodes, limits_of, record
+from tests.benchmarks.plan.plan_estimator import PlanEstimator, Schooling, tell, train
+from tests.benchmarks.plan.plan_information import COLUMNS, LIMIT_COLUMNS, TEST_SEED, elbow, places_of
 
 SEEN, PLAN = 3, len(TARGETS)
 ROUND_OFF = 1e-4

@@ -1,6 +1,6 @@
 """Policies that act on an estimate of the plan: the second table of docs/hidden-intent.md.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/plan_belief.py --runs out/plan --told out/ablations/told_plan_0 \
+    OMP_NUM_THREADS=1 python tests/benchmarks/plan/plan_belief.py --runs out/plan --told out/ablations/told_plan_0 \
         [--out docs/plan_belief.csv]
 
 An estimator of the plan sees `device` (plan_information.py, whose folder --runs is). Its estimates stand in for the
@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[3]))
 
 import numpy as np
 import torch
@@ -32,12 +32,12 @@ from agents.evaluation.comparison.statistics import estimate, interquartile_mean
 from agents.policies.learned import find_policy
 from exo_env.tasks.judgement.intent_rewards import INTENT_WIDTH
 from tests.benchmarks import csv_file
-from tests.benchmarks.belief_learning import TOLD, BeliefLearning
-from tests.benchmarks.believer import Believer
-from tests.benchmarks.estimate_pd import searched
-from tests.benchmarks.plan_episodes import NOBODY, Driver, Episodes, record
-from tests.benchmarks.plan_estimator import PlanEstimator, Schooling, train
-from tests.benchmarks.plan_information import (
+from tests.benchmarks.plan.belief_learning import TOLD, BeliefLearning
+from tests.benchmarks.plan.believer import Believer
+from tests.benchmarks.plan.estimate_pd import searched
+from tests.benchmarks.plan.plan_episodes import NOBODY, Driver, Episodes, record
+from tests.benchmarks.plan.plan_estimator import PlanEstimator, Schooling, train
+from tests.benchmarks.plan.plan_information import (
     DISTURBANCE,
     LEARNED,
     MIXTURE,

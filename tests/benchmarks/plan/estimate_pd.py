@@ -16,9 +16,9 @@ import numpy as np
 from agents.environment import HIDDEN_PLAN, make, patient_seeds
 from agents.policies.reference_free.assist_moment import AssistMoment, Seen
 from agents.policies.reference_free.oracle import FORGETTING
-from tests.benchmarks.believer import Believer
-from tests.benchmarks.plan_episodes import SETTINGS, TARGETS, record
-from tests.benchmarks.plan_estimator import PlanEstimator
+from tests.benchmarks.plan.believer import Believer
+from tests.benchmarks.plan.plan_episodes import SETTINGS, TARGETS, record
+from tests.benchmarks.plan.plan_estimator import PlanEstimator
 
 RANGES = {
     "stiffness": (0.5, 20.0), "integral": (0.5, 60.0), "damping": (0.3, 3.0), "s0_deg": (3.0, 40.0),

@@ -1,6 +1,6 @@
 """How much of the plan each set of sensors shows: the table of docs/hidden-intent.md.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/plan_information.py --runs out/plan [--out docs/plan_information.csv]
+    OMP_NUM_THREADS=1 python tests/benchmarks/plan/plan_information.py --runs out/plan [--out docs/plan_information.csv]
 
 Episodes of `wide` under a mixture of controllers, whose moments are disturbed, train a network with memory for each set
 (plan_estimator.py). Each tells the plan of patients of `evaluation` whom nobody helps, and whom the shipped policy
@@ -21,7 +21,7 @@ from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[3]))
 
 import numpy as np
 import torch
@@ -31,8 +31,8 @@ from dms_core.model.muscles.activation import MINIMUM
 from exo_env.patient.patient import SHOWN
 from exo_env.tasks.judgement.intent_rewards import INTENT_WIDTH
 from tests.benchmarks import csv_file
-from tests.benchmarks.plan_episodes import NOBODY, SETTINGS, TARGETS, Episodes, record
-from tests.benchmarks.plan_estimator import PlanEstimator, Schooling, tell, train
+from tests.benchmarks.plan.plan_episodes import NOBODY, SETTINGS, TARGETS, Episodes, record
+from tests.benchmarks.plan.plan_estimator import PlanEstimator, Schooling, tell, train
 
 LEARNED = "learned_intent"
 MIXTURE = (NOBODY, "mean_angle", "adaptive_gravity", LEARNED, "soft_oracle")

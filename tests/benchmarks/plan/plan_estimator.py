@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from tests.benchmarks.plan_episodes import TARGETS, Episodes
+from tests.benchmarks.plan.plan_episodes import TARGETS, Episodes
 
 SET_ASIDE = 0.1
 """Share of the episodes that are not learned from."""

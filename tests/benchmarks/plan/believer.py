@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from tests.benchmarks.plan_episodes import EVERY
-from tests.benchmarks.plan_estimator import PlanEstimator
+from tests.benchmarks.plan.plan_episodes import EVERY
+from tests.benchmarks.plan.plan_estimator import PlanEstimator
 
 
 @dataclass(frozen=True)

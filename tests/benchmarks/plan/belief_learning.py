@@ -22,9 +22,9 @@ from agents.training.settings.config import Config
 from agents.training.worlds import training_worlds
 from agents.training.wrappers.low_pass import LowPassObservations, kept_shares
 from dms_core.files.config_files import configs
-from tests.benchmarks.believer import Belief, Believer
-from tests.benchmarks.plan_episodes import TARGETS, record
-from tests.benchmarks.plan_estimator import PlanEstimator
+from tests.benchmarks.plan.believer import Belief, Believer
+from tests.benchmarks.plan.plan_episodes import TARGETS, record
+from tests.benchmarks.plan.plan_estimator import PlanEstimator
 
 RECIPE = Path("agents/hidden_intent/ppo.yml")
 TOLD = tuple(
