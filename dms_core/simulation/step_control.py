@@ -251,15 +251,12 @@ def find_slopes_anew(m, s):
 
 
 @compiled
-def finish_step(m, s, o, h, c0, started, stop, landed, kept):
-    """Take over a solved step, with the rates behind it where somebody asks for them; False if there are none."""
-    note_errors(s)
-    accept(s, h, c0, started)
-    if landed:
-        land(s, stop)
+def find_rates_behind(m, s, o, started, stop, landed, kept):
+    """Rates behind an accepted step, where somebody asks for them, and a landing's clock; False if there are none."""
+    c0 = land(s, o, stop) if landed else 0.0
     # Methods without a past want rates between two landings only for a record.
     wanted_rates = started if o.method == METHOD.bdf2 else kept or landed
-    return not wanted_rates or find_rates(m, s, o, c0 if landed and o.method == METHOD.sdirk2 else 0.0)
+    return not wanted_rates or find_rates(m, s, o, c0)
 
 
 @compiled
@@ -317,21 +314,30 @@ def one_step(m, s, o, stop, kept):
             return OUTCOME.step_too_small if code == NEWTON.converged else OUTCOME.newton_failed
     if nearly_singular(s):
         error = min(error, KEEPING)
-    if not finish_step(m, s, o, h, c0, started, stop, h == rest, kept):
-        return OUTCOME.rates_failed
+    note_errors(s)
+    accept(s, h, c0, started)
     if not fixed:
         choose_next_size(m, s, o, h, wanted, error, iterations, equal, h == rest, failures == 0)
-    return OUTCOME.done
+    return OUTCOME.done if find_rates_behind(m, s, o, started, stop, h == rest, kept) else OUTCOME.rates_failed
 
 
 @compiled
-def land(s, stop):
-    """Set the clock exactly; behind a jump of an input the method starts afresh."""
-    floats(s, STATE.clock)[CLOCK.t] = stop
+def land(s, o, stop):
+    """Set the clock exactly; behind a jump of an input the method starts afresh.
+
+    Gives c0 of the next steps of SDIRK2, for which a matrix is made where they begin, if the next landing is as far off
+    as this one was from the last; 0 for another method.
+    """
+    clock = floats(s, STATE.clock)
+    span, clock[CLOCK.landed], clock[CLOCK.t] = stop - clock[CLOCK.landed], stop, stop
     jumps = floats(inner(s, STATE.signals), SIGNALS.jumps)
     for k in range(jumps.shape[0]):
         if jumps[k] == stop:
             ints(s, STATE.counts)[COUNTS.restart] = 1
+    if o.method != METHOD.sdirk2:
+        return 0.0
+    h = o.fixed_step if o.fixed_step > 0.0 else min(clock[CLOCK.h_wanted], o.h_max)
+    return 1.0 / (GAMMA * landing_size(h, span, o.fixed_step > 0.0, o.fixed_step <= 0.0 and span <= NEAR * h))
 
 
 @compiled
