@@ -18,7 +18,7 @@ OLDEST_GYMNASIUM := 1.2.0
 help:
 	@echo "make demo   the paper's four scenarios, then baselines and learned policies: figures, tables, film, into $(OUT)"
 	@echo "            (two minutes on two idle cores; the first time some more, for installing and compiling)"
-	@echo "make test   the tests (seven minutes on two idle cores; the first time some more)"
+	@echo "make test   the tests (less than six minutes on two idle cores; the first time some more)"
 	@echo "make test-slow  those that take longest, and those that need ONNX and Ray"
 	@echo "make test-oldest  those of the environment with Gymnasium $(OLDEST_GYMNASIUM), the oldest allowed"
 	@echo "make test-rllib  a training step of RLlib"
