@@ -8,9 +8,7 @@ columns cost dearly. Two freedoms are used to have few blocks:
   last step that it depends on (depth first through the graph of L and U);
 - a block may end early: the borders that cost least are found exactly, by dynamic programming.
 
-A solve meets each number once, and waits for the sum of every block. Where blocks are sparse, the entries of L and U
-stand for it one by one in a list of moves, sorted by how many moves each has to wait for, so that neighbours in the
-list hardly ever wait for each other (level scheduling: Anderson and Saad 1989).
+Where blocks are sparse a solve goes entry by entry (moves.py).
 """
 
 from __future__ import annotations
@@ -22,12 +20,11 @@ import numpy as np
 from dms_core.compiled.jit import compiled
 from dms_core.errors import InputError
 from dms_core.linear.lanes import WIDTH
+from dms_core.linear.moves import moves
 from dms_core.linear.ordering import SingularMatrixError, compressed, markowitz
 
 BLOCK_COST, GROUP_COST = 1.0, 3.0
 """Cost of one stored block (a load in each solve) and one group of columns, in block updates of the factorisation."""
-
-
 SPARSE = 3.5
 """Entries of L + U a block up to which a solve goes entry by entry; at 4 both ways take the same time."""
 
@@ -321,7 +318,8 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
     target = _targets(n, fill, first, diagonal, end, group, int((below * (end - diagonal)).sum()) // WIDTH)
     right = fill.start[1:] - fill.diagonal
     position = _positions(_inverse(row_perm)[rows], _inverse(col_perm)[cols], slot, first, group)
-    lower, goal, source = _moves(n, fill) if fill.column.size <= SPARSE * group.size else NO_MOVES
+    sparse = fill.column.size <= SPARSE * group.size
+    lower, goal, source = moves(n, fill.start, fill.column, fill.diagonal) if sparse else NO_MOVES
     place = _positions(goal, source, slot, first, group)
     numbers = group.size * WIDTH
     # Unsigned indices spare the compiled loops numba's test for negative ones.
@@ -353,31 +351,6 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
 
 
 NO_MOVES = 0, np.zeros(0, np.int64), np.zeros(0, np.int64)
-
-
-def _moves(n, fill: Fill) -> tuple[int, np.ndarray, np.ndarray]:
-    """(number of moves of L, steps that are changed, steps that they are changed by): moves of L, then those of U."""
-    row, column = np.repeat(np.arange(n), np.diff(fill.start)), fill.column
-    down, up = _depths(n, fill.start, column, fill.diagonal)
-    lower, upper = np.flatnonzero(column < row), np.flatnonzero(column > row)
-    lower = lower[np.lexsort((row[lower], column[lower], down[column[lower]]))]
-    upper = upper[np.lexsort((row[upper], -column[upper], up[column[upper]]))]
-    order = np.concatenate([lower, upper])
-    return lower.size, row[order], column[order]
-
-
-@compiled(makes_arrays=True)
-def _depths(n, start, column, diagonal):
-    """Length of the longest chain of moves that a step waits for, in the solve with L and in that with U."""
-    down, up = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    for i in range(n):
-        for p in range(start[i], diagonal[i]):
-            down[i] = max(down[i], down[column[p]] + 1)
-    for r in range(n):
-        i = n - 1 - r
-        for p in range(diagonal[i] + 1, start[i + 1]):
-            up[i] = max(up[i], up[column[p]] + 1)
-    return down, up
 
 
 @compiled(makes_arrays=True)
