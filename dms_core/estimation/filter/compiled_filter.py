@@ -106,6 +106,19 @@ class CompiledFilter:
         self.begin(correction.belief)
         self.arrays.nis[:] = correction.nis, len(correction.residual)
 
+    def shown(self) -> tuple[np.ndarray, np.ndarray]:
+        """What all channels should show at the present belief, and its covariance C P C^T, noise and biases left out.
+
+        A channel of which no reading ever comes is a virtual sensor.
+
+        Raises:
+            SimulationError: no accelerations belong to the belief.
+        """
+        code, a = self.packed.expect(), self.arrays
+        if code != CODE.done:
+            raise SimulationError(f"compiled filter: {WHY[code]} at t = {self.kalman.world.time:.6g} s.")
+        return a.expected.copy(), a.C @ a.P @ a.C.T
+
     def belief(self) -> Belief:
         """The present belief."""
         return self.keep()()

@@ -51,8 +51,12 @@ class FilterArrays(NamedTuple):
     start: np.ndarray
     """Mean before a correction, (n,)."""
     P_start: np.ndarray
+    q: np.ndarray
+    """Where a period begins, (n_q,)."""
     v: np.ndarray
-    """Rates that are wanted of the independent coordinates, (n_q,)."""
+    """Rates there, or those that are wanted of the independent coordinates, (n_q,)."""
+    begin: np.ndarray
+    """When it begins [s], (1,)."""
     intensity: np.ndarray
     """Variance per second of the noise that drives each coordinate of second order, (n_q,); (0,) for none."""
     gram: np.ndarray

@@ -5,11 +5,12 @@ from dms_core.compiled.jit import compiled
 from dms_core.estimation.filter.filter_arrays import CODE, FILTER, TABLES
 from dms_core.estimation.filter.filter_numbers import put_rest
 from dms_core.estimation.filter.filter_reading import chart_size
+from dms_core.estimation.filter.nominal_world import FINER
 from dms_core.sensitivity.tangents.chart import CHART, factor_square, lift, pick, solve_factored
 from dms_core.sensitivity.tangents.steps import carry_forward, differentiated_step
 from dms_core.sensitivity.tangents.tables import COLUMNS, KIND
 from dms_core.simulation.iteration.parts import restart
-from dms_core.simulation.state import COUNTS, STATE
+from dms_core.simulation.state import CLOCK, COUNTS, STATE, rewind
 
 STEEP = 5.0
 """Largest entry of a column of the chart up to which its coordinates tell the motion well."""
@@ -38,24 +39,55 @@ def _begin_columns(f, c, n_x):
 
 
 @compiled
-def predict(t, o):
-    """From one time to the next; gives a code."""
-    m, s, d, c, chart, f = (
-        inner(t, TABLES.model), inner(t, TABLES.state), inner(t, TABLES.differentials), inner(t, TABLES.columns),
-        inner(t, TABLES.chart), inner(t, TABLES.filter),
-    )  # fmt: skip
-    n_x = chart_size(chart)
+def _keep_begin(f, s):
+    """Where the period begins."""
+    q_0, v_0, q, v = floats(f, FILTER.q), floats(f, FILTER.v), floats(s, STATE.q), floats(s, STATE.v)
+    for i in range(q.shape[0]):
+        q_0[i], v_0[i] = q[i], v[i]
+    floats(f, FILTER.begin)[0] = floats(s, STATE.clock)[CLOCK.t]
+
+
+@compiled
+def _back_to_begin(f, s):
+    """Where the period began, as if nothing had been computed."""
+    rewind(s, floats(f, FILTER.q), floats(f, FILTER.v), 0.0)
+    floats(s, STATE.clock)[CLOCK.t] = floats(f, FILTER.begin)[0]
+
+
+@compiled
+def _advance(m, s, o, d, c, chart, f, steps):
+    """A period in that many steps, with all columns through them; gives a code."""
     ints(s, STATE.counts)[COUNTS.rates_factored] = 0
     if not restart(m, s, o):
         return CODE.unsolved
     if not lift(m, s, chart, c):
         return CODE.steep
-    _begin_columns(f, c, n_x)
-    period = floats(f, FILTER.period)
-    for _ in range(int(period[1])):
-        if not differentiated_step(m, s, o, d, period[0] / period[1], KIND.sdirk2):
+    _begin_columns(f, c, chart_size(chart))
+    for _ in range(steps):
+        if not differentiated_step(m, s, o, d, floats(f, FILTER.period)[0] / steps, KIND.sdirk2):
             return CODE.unsolved
         carry_forward(m, d, c)
+    return CODE.done
+
+
+@compiled
+def predict(t, o):
+    """From one time to the next, in more steps where Newton's method needs them; gives a code."""
+    m, s, d, c, chart, f = (
+        inner(t, TABLES.model), inner(t, TABLES.state), inner(t, TABLES.differentials), inner(t, TABLES.columns),
+        inner(t, TABLES.chart), inner(t, TABLES.filter),
+    )  # fmt: skip
+    n_x = chart_size(chart)
+    _keep_begin(f, s)
+    code, steps = CODE.unsolved, int(floats(f, FILTER.period)[1])
+    for finer in range(FINER):
+        if finer > 0:
+            _back_to_begin(f, s)
+        code = _advance(m, s, o, d, c, chart, f, steps << finer)
+        if code != CODE.unsolved:
+            break
+    if code != CODE.done:
+        return code
     _note_transition(f, c, chart, n_x)
     if not lift(m, s, chart, c) or _steepest(c, n_x) > STEEP:
         return CODE.steep

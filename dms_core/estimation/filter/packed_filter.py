@@ -15,6 +15,7 @@ from dms_core.estimation.filter.filter_arrays import FilterArrays, FilterTables
 from dms_core.estimation.filter.filter_correction import correct
 from dms_core.estimation.filter.filter_numbers import put_rest, straight_directions
 from dms_core.estimation.filter.filter_prediction import predict
+from dms_core.estimation.filter.filter_reading import expect
 from dms_core.estimation.filter.filter_step import filter_step
 from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.sensitivity.tangents.chart import packed_chart
@@ -111,6 +112,10 @@ class PackedFilter:
         """By the readings; gives a code."""
         return correct(self.tables.table, self.world.numbers)
 
+    def expect(self) -> int:
+        """What the channels should show; gives a code."""
+        return expect(self.tables.table)
+
     def step(self) -> int:
         """Both; gives a code."""
         return filter_step(self.tables.table, self.world.numbers)
@@ -152,8 +157,8 @@ class PackedFilter:
             turned=kalman.turned[outputs].astype(np.int64),
             found_at=np.searchsorted(_rows(kalman), outputs).astype(np.int64),
             C=np.zeros((len(names), n)), expected=np.zeros(len(names)), innovation=np.zeros(len(names)),
-            reading=np.full(len(names), np.nan),
-            v=np.zeros(model.n_q), intensity=intensity, order=np.zeros(n_z, np.int64),
+            reading=np.full(len(names), np.nan), q=np.zeros(model.n_q), v=np.zeros(model.n_q), begin=np.zeros(1),
+            intensity=intensity, order=np.zeros(n_z, np.int64),
             bounded=np.array([k for k, _, _ in bounds], np.int64), least=np.array([x for _, x, _ in bounds], float),
             most=np.array([x for _, _, x in bounds], float),
             declared=np.array([declared_number(model.system, *key) for key in es.constants], float),

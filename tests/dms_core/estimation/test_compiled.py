@@ -9,7 +9,9 @@ from dms_core import Model
 from dms_core.errors import InputError, SimulationError
 from dms_core.estimation import Bias, Channel, EstimatedInput, FilterBatch, FilterSettings, KalmanFilter
 from dms_core.estimation.filter.compiled_filter import CompiledFilter
-from dms_core.estimation.filter.forms import CompiledKalmanFilter
+from dms_core.estimation.filter.forms import CompiledKalmanFilter, filter_of
+from dms_core.estimation.filter.unscented import UnscentedFilter
+from dms_core.model_files.model_file import load
 from tests.dms_core.estimation.systems import driven_four_bar, masses, slider_crank
 from tests.dms_core.estimation.test_observability import two_muscles
 
@@ -197,7 +199,7 @@ class TestBatch:
 
 def test_records_are_filtered_by_compiled_steps_where_they_can():
     """Of a model file, alone and as the command takes it."""
-    model = load_model("configs/estimation/forearm.yaml")
+    model = load("configs/estimation/forearm.yaml")
     settings = FilterSettings.from_file("configs/estimation/forearm_filter.yaml")
     assert type(filter_of(Model(model), settings)) is CompiledKalmanFilter
     unscented = FilterSettings(**{**dict(settings), "form": "unscented"})
