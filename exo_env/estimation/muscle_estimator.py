@@ -30,6 +30,10 @@ CELL = ROPE_TENSION
 """Channel of a load cell between handle and rope."""
 LEAST_LOAD, LEAST = 0.05, 1.1 * MINIMUM
 """Least load [kg] and activation [-]: at the minimum of the muscle model nothing moves with it."""
+FIBRE = 0.001
+"""Deviation of a fibre's length at the start [m]: electrodes' noise moves the length at rest by some tenths of a mm."""
+WEAKEST = 0.1
+"""Least mass and strength, over those of the average man."""
 SURE = 1e-4
 """Deviation of what is told, over what it is of what is not."""
 
@@ -131,6 +135,9 @@ class MuscleEstimator:
         drives = {excitation_name(m): EstimatedInput(deviation=0.1, walk=t.activation) for m in self.muscles}
         bounds: dict[str, tuple[float | None, float | None]] = {name: (LEAST, 1.0) for name in drives}
         bounds[f"{WEIGHT}.mass"] = (LEAST_LOAD, None)
+        strongest = {m: self.arm.muscle(m).max_isometric_force for m in self.muscles}
+        bounds |= {f"{m}.max_isometric_force": (WEAKEST * x, None) for m, x in strongest.items()}
+        bounds["forearm.mass"] = (WEAKEST * self.arm.segments["forearm"].mass, None)
         walk = 0.0 if self.known.load else t.load_walk
         return FilterSettings(
             period=self.period, steps=self.steps, channels=channels,
@@ -144,18 +151,33 @@ class MuscleEstimator:
                 **{f"{m}.max_isometric_force": EstimatedConstant(deviation=1.0) for m in self.muscles},
             },
             noise=MotionNoise(rate=0.0),
-            initial=InitialDeviations(position=0.01, velocity=0.05, state=0.005), bounds=bounds,
+            initial=InitialDeviations(position=0.01, velocity=0.05, state=FIBRE), bounds=bounds,
         )  # fmt: skip
 
     def reset(self, readings: Mapping[str, float], load: float | None = None) -> MuscleEstimate:
         """Begin with first readings, by channel, and the load where it is known [kg]."""
         start = np.array([min(max(readings.get(emg_channel(m), 0.0), LEAST), 1.0) for m in self.muscles])
         weight = load if self.known.load and load is not None else self.tuning.load
-        system = self.elbow.system(readings[ANGLE], weight, start)
-        self.filter = CompiledFilter(Model(system, like=self._model), self._settings())
+        self._make(readings[ANGLE], weight, start)
         self._begin(self.filter.kalman.start())
         self.filter.correct(readings)
-        return self._told(load)
+        return self._told()
+
+    def _make(self, angle: float, load: float, activations: np.ndarray) -> None:
+        """A filter that begins at rest, with fibres in balance with their tendons."""
+        system = self.elbow.system(angle, load, activations)
+        self.filter = CompiledFilter(Model(system, like=self._model), self._settings())
+
+    def _again(self, readings: Mapping[str, float]) -> None:
+        """Begin anew at the present angle, with fibres in balance, and with what is known beside the state."""
+        a = self.filter.arrays
+        rest, known = a.rest.copy(), a.P[-len(a.rest) :, -len(a.rest) :].copy()
+        self._make(readings[ANGLE], float(rest[self._first]), rest[2 : self._first])
+        belief = self.filter.kalman.start()
+        P = belief.P.copy()
+        P[-len(rest) :, -len(rest) :] = known
+        self.filter.begin(replace(belief, P=P, rest=rest))
+        self.filter.correct(readings)
 
     def _begin(self, belief: Belief) -> None:
         """Begin with a belief in which the constants, and their covariance, are those before anything was read."""
@@ -172,7 +194,7 @@ class MuscleEstimator:
         if self.known.load:
             P[n + first, n + first] *= SURE**2
         rest[first + 2 :] = forces
-        # Where a muscle is weaker than the model's, its fibre is not at rest any more, for some hundredths of a second.
+        # Fibre and tendon are as strong as each other, so that the balance does not change with their largest force.
         self._first = first
         self.filter.begin(replace(belief, P=P, rest=rest))
 
@@ -186,10 +208,10 @@ class MuscleEstimator:
             self.filter.step(readings)
         except SimulationError:
             self.lost += 1
-            self._begin(self.filter.belief())
-        return self._told(load)
+            self._again(readings)
+        return self._told()
 
-    def _told(self, load: float | None) -> MuscleEstimate:
+    def _told(self) -> MuscleEstimate:
         """What is known behind readings."""
         y, cov = self.filter.shown()
         m, a = len(self.muscles), self.filter.arrays
