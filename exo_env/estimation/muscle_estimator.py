@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core import Model
-from dms_core.errors import SimulationError
 from dms_core.estimation import Channel, CompiledFilter, EstimatedConstant, EstimatedInput, FilterSettings
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.settings import InitialDeviations, MotionNoise
 from dms_core.model.muscles.activation import MINIMUM
-from exo_env.ecosystem.arm import excitation_name
+from exo_env.ecosystem.arm import excitation_name, path_geometry
 from exo_env.ecosystem.gym_machine import WEIGHT
 from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, RATE
@@ -46,20 +45,20 @@ def emg_channel(muscle: str) -> str:
 class MuscleTuning(NamedTuple):
     """What the filter takes for granted of the unknown; chosen on patients of `mixed` and `wide`."""
 
-    activation: float = 0.25
+    activation: float = 0.08
     """How far an activation walks in a second [1 / sqrt s]."""
     emg: float = 0.03
     """Noise of an envelope [-]."""
     device: float = 20.0
     """How far the moment of the ropes walks in a second [Nm / sqrt s]."""
-    rest: float = 0.4
+    rest: float = 0.3
     """Deviation of the moment that nothing explains [Nm]."""
-    rest_time: float = 0.1
+    rest_time: float = 0.05
     """In which it forgets [s]."""
     load: float = 1.25
     """Mean of the load [kg]."""
     load_deviation: float = 0.5
-    load_walk: float = 0.05
+    load_walk: float = 0.02
     """How far the load walks in a second [kg / sqrt s]."""
     mass_doubt: float = 0.2
     """Deviation of the forearm's mass, as a part of it."""
@@ -67,8 +66,9 @@ class MuscleTuning(NamedTuple):
     """Mean of the largest forces, over those of an average man."""
     strength_doubt: float = 0.3
     """Deviation of what all muscles share of it, as a part of it."""
-    muscle_doubt: float = 0.1
-    """Deviation of each muscle's own part."""
+    muscle_doubt: float = 0.02
+    """Deviation of each muscle's own part: with a larger one each force is learnt too small, since noise of the electrodes
+    is as large as most activations, and what is correlated with a noisy number seems to be less of it."""
 
 
 class Known(NamedTuple):
@@ -116,7 +116,7 @@ class MuscleEstimator:
         self.arm = elbow.arm()
         self.muscles = self.arm.muscles
         self.lost = 0
-        """Times that the filter began anew."""
+        """Times that the fibres could not be stepped, and were put in balance with their tendons."""
         angles = np.radians(np.arange(-10.0, 160.0, 2.0))
         self._angles = angles
         self._levers = np.array([[elbow.lever(self.arm, m, x) for x in angles] for m in self.muscles])
@@ -168,16 +168,16 @@ class MuscleEstimator:
         system = self.elbow.system(angle, load, activations)
         self.filter = CompiledFilter(Model(system, like=self._model), self._settings())
 
-    def _again(self, readings: Mapping[str, float]) -> None:
-        """Begin anew at the present angle, with fibres in balance, and with what is known beside the state."""
-        a = self.filter.arrays
-        rest, known = a.rest.copy(), a.P[-len(a.rest) :, -len(a.rest) :].copy()
-        self._make(readings[ANGLE], float(rest[self._first]), rest[2 : self._first])
-        belief = self.filter.kalman.start()
-        P = belief.P.copy()
-        P[-len(rest) :, -len(rest) :] = known
-        self.filter.begin(replace(belief, P=P, rest=rest))
-        self.filter.correct(readings)
+    def _balance(self) -> None:
+        """Put the fibres where they are in balance with their tendons, in the belief as it is else."""
+        belief = self.filter.belief()
+        q, v, index = belief.q.copy(), belief.v.copy(), self.filter.kalman.model.layout.index
+        y, _ = self.filter.shown()
+        for k, m in enumerate(self.muscles):
+            length = path_geometry(self.arm, self.elbow.path(self.arm, m), float(y[0]))[0]
+            place = index[f"{m}.fibre_length"]
+            q[place], v[place] = self.elbow.muscle(self.arm, m).equilibrium(length, float(belief.rest[2 + k])), 0.0
+        self.filter.begin(replace(belief, q=q, v=v))
 
     def _begin(self, belief: Belief) -> None:
         """Begin with a belief in which the constants, and their covariance, are those before anything was read."""
@@ -204,11 +204,10 @@ class MuscleEstimator:
         if self.known.load and load is not None:
             a.rest[self._first] = load
             self.filter.packed.put_rest()
-        try:
-            self.filter.step(readings)
-        except SimulationError:
+        if not self.filter.try_step(readings):
             self.lost += 1
-            self._again(readings)
+            self._balance()
+            self.filter.correct(readings)
         return self._told()
 
     def _told(self) -> MuscleEstimate:

@@ -218,7 +218,7 @@ def main() -> None:
     parser.add_argument("--patients", type=int, default=50)
     parser.add_argument("--population", default="evaluation")
     parser.add_argument("--seed", type=int, default=FIRST_SEED)
-    parser.add_argument("--rate", type=float, default=100.0, help="of all readings [Hz]")
+    parser.add_argument("--rate", type=float, default=50.0, help="of all readings [Hz]")
     parser.add_argument("--causes", action="store_true", help="take causes of the error off one by one")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()

@@ -11,12 +11,12 @@ from functools import partial
 import numpy as np
 
 from dms_core.assembly.model import Model
-from dms_core.errors import InputError, SimulationError
+from dms_core.errors import SimulationError
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.charts import chart_with
 from dms_core.estimation.filter.filter_arrays import CODE, FilterArrays
 from dms_core.estimation.filter.kalman import KalmanFilter
-from dms_core.estimation.filter.packed_filter import PackedFilter, cannot_be_compiled
+from dms_core.estimation.filter.packed_filter import PackedFilter
 from dms_core.estimation.settings import FilterSettings
 
 WHY = {
@@ -40,9 +40,6 @@ class CompiledFilter:
 
     def __init__(self, model: Model, settings: FilterSettings) -> None:
         self.kalman = KalmanFilter(model, settings)
-        lacking = cannot_be_compiled(self.kalman)
-        if lacking is not None:
-            raise InputError(f"compiled filter: it does not have {lacking}. Use `KalmanFilter` for this one.")
         self.names = list(settings.channels)
         """Channels, in the order of readings."""
         self.packed = PackedFilter(self.kalman)
@@ -65,6 +62,15 @@ class CompiledFilter:
             SimulationError: the filter cannot go on; `belief` is what it was before.
         """
         self._call(readings, True)
+
+    def try_step(self, readings: Mapping[str, float]) -> bool:
+        """As `step`, in compiled code alone; False where that cannot go on, and the filter is where it was before."""
+        before = self.keep()
+        self.arrays.reading[:] = [readings.get(name, np.nan) for name in self.names]
+        if self.packed.step() == CODE.done:
+            return True
+        self.begin(before())
+        return False
 
     def correct(self, readings: Mapping[str, float]) -> None:
         """Take readings at the present time.

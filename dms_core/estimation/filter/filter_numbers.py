@@ -31,6 +31,8 @@ STRAIGHT = 1e-12
 
 def straight_directions(model: Model, constants: list[tuple[str, str]]) -> list[Direction] | None:
     """What each constant moves; None where one moves a constraint, or numbers not in a straight line."""
+    if not constants:
+        return []
     declared = {key: declared_number(model.system, *key) for key in constants}
     base, far, found = numbers_with(model.layout, declared), dict[tuple[str, str], float](), list[Direction]()
     sums = [x.copy() for x in base]

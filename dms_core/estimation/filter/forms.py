@@ -8,6 +8,7 @@ from dms_core.assembly.model import Model
 from dms_core.errors import SimulationError
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.filter_arrays import CODE
+from dms_core.estimation.filter.filter_numbers import straight_directions
 from dms_core.estimation.filter.gaussian import is_usable
 from dms_core.estimation.filter.kalman import Correction, KalmanFilter, Predicted
 from dms_core.estimation.filter.packed_filter import PackedFilter, cannot_be_compiled
@@ -20,7 +21,10 @@ class CompiledKalmanFilter(KalmanFilter):
 
     Args:
         model: a compiled model; the numbers that are estimated are written into it.
-        settings: of a filter of which `cannot_be_compiled` says nothing.
+        settings: of the filter.
+
+    Raises:
+        InputError: compiled steps do not have what the settings ask for (`cannot_be_compiled`).
     """
 
     def __init__(self, model: Model, settings: FilterSettings) -> None:
@@ -69,4 +73,5 @@ def filter_of(model: Model, settings: FilterSettings) -> KalmanFilter:
     if settings.form == "unscented":
         return UnscentedFilter(model, settings)
     kalman = KalmanFilter(model, settings)
-    return kalman if cannot_be_compiled(kalman) else CompiledKalmanFilter(model, settings)
+    directions = straight_directions(model, kalman.estimated.constants)
+    return kalman if cannot_be_compiled(kalman, directions) else CompiledKalmanFilter(model, settings)

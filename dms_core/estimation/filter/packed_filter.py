@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from dms_core.assembly.derivatives.parameter_derivatives import Direction, declared_number
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import Packed, number
+from dms_core.errors import InputError
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.charts import Chart, chart_at
 from dms_core.estimation.filter.filter_arrays import FilterArrays, FilterTables
@@ -23,8 +22,13 @@ from dms_core.sensitivity.tangents.reading_tables import SomeReadings, calls_of,
 from dms_core.sensitivity.tangents.tables import new_columns, new_differentials, new_movement
 
 
-def cannot_be_compiled(kalman: KalmanFilter) -> str | None:
-    """What of a filter compiled steps do not have, in words; None for nothing."""
+def cannot_be_compiled(kalman: KalmanFilter, directions: list[Direction] | None) -> str | None:
+    """What of a filter compiled steps do not have, in words; None for nothing.
+
+    Args:
+        kalman: the filter.
+        directions: what its constants move, as `straight_directions` gives it.
+    """
     model, es = kalman.model, kalman.estimated
     rows = _rows(kalman)
     through = model.derivatives.inputs.moments_read(rows.tolist()) & set(es.inputs)
@@ -34,7 +38,7 @@ def cannot_be_compiled(kalman: KalmanFilter) -> str | None:
         return "a model with drivers"
     if through or reads_welds(model, calls_of(model, rows.tolist())):
         return "a channel that shows a reaction between welded bodies, or the moment of an estimated input itself"
-    if kalman.estimated.constants and straight_directions(model, es.constants) is None:
+    if directions is None:
         return "a constant that moves a constraint, or that moves the numbers of a kernel not in a straight line"
     return None
 
@@ -48,7 +52,10 @@ class PackedFilter:
     """Packed tables of one filter.
 
     Args:
-        kalman: a filter of which `cannot_be_compiled` says nothing.
+        kalman: a filter.
+
+    Raises:
+        InputError: `cannot_be_compiled` has something to say of it.
 
     Attributes:
         arrays: what the filter believes and works with.
@@ -58,17 +65,15 @@ class PackedFilter:
     def __init__(self, kalman: KalmanFilter) -> None:
         self.kalman = kalman
         self.world = kalman.world
+        directions = straight_directions(kalman.model, kalman.estimated.constants)
+        lacking = cannot_be_compiled(kalman, directions)
+        if lacking is not None or directions is None:
+            raise InputError(f"compiled filter: it does not have {lacking}. Use `KalmanFilter` for this one.")
+        self._directions: list[Direction] = directions
         self._chart: Chart | None = None
         self._world_tables: Packed | None = None
         self.arrays: FilterArrays
         self.tables: Packed
-
-    @cached_property
-    def _directions(self) -> list[Direction]:
-        """What each constant moves."""
-        found = straight_directions(self.kalman.model, self.kalman.estimated.constants)
-        assert found is not None
-        return found
 
     def load(self, belief: Belief) -> None:
         """Go to a belief, in its own coordinates."""
@@ -138,8 +143,8 @@ class PackedFilter:
             world.forget_numbers()
             world.put_numbers({})
         n, n_k, n_z = chart.size + len(es.rest_names), len(es.constants), len(chart.chosen)
-        movements = [new_movement(world.tables.values, x) for x in self._directions] if n_k else []
-        readings = SomeReadings(model, _rows(kalman).tolist(), world.state.w, self._directions if n_k else [])
+        movements = [new_movement(world.tables.values, x) for x in self._directions]
+        readings = SomeReadings(model, _rows(kalman).tolist(), world.state.w, self._directions)
         columns = new_columns(model, chart.size + len(es.inputs) + n_k)
         columns.values.parameter[chart.size + len(es.inputs) :] = np.arange(n_k)
         outputs, rest = np.array([es.outputs[name] for name in names]), list(es.rest_names)
