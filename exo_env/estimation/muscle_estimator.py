@@ -67,8 +67,8 @@ class MuscleTuning(NamedTuple):
     strength_doubt: float = 0.3
     """Deviation of what all muscles share of it, as a part of it."""
     muscle_doubt: float = 0.02
-    """Deviation of each muscle's own part: with a larger one each force is learnt too small, since noise of the electrodes
-    is as large as most activations, and what is correlated with a noisy number seems to be less of it."""
+    """Deviation of each muscle's own part: with a larger one each force is learnt too small, since noise of the
+    electrodes is as large as most activations, and what goes with a noisy number seems to be less of it."""
 
 
 class Known(NamedTuple):
