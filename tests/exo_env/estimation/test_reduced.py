@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, World
+from exo_env.ecosystem.cuff import DAMPING, STIFFNESS
 from exo_env.ecosystem.person import HEIGHT_0, MASS_0
 from exo_env.envs.hidden_intent import HiddenIntentEnv
 from exo_env.envs.settings import DEFAULT_LOAD
@@ -254,6 +255,25 @@ def test_a_start_without_some_reading_is_a_guess(places, reading):
         assert np.isfinite(found).all()
     assert abs(found[ESTIMATE.others_moment] + 0.16 * 3.0) < 0.1
     assert abs(one.mean[0] - 0.8) < 0.01
+
+
+def test_what_a_device_knows_of_itself_widens_its_deviation():
+    """A rate of readings below 50 Hz, and a cuff that gives way; in a rigid guide at 50 Hz and more nothing changes."""
+    place, doubt = NUMBERS.inertia_doubt, ReducedTuning().inertia_doubt
+
+    def found(period, **changes):
+        elbow = reduced_elbow(HiddenIntentEnv(**changes).ecosystem, period, NOISE)
+        return elbow.numbers[place]
+
+    assert [found(T) for T in (0.02, 0.01, 0.001)] == [doubt] * 3
+    assert doubt < found(0.05) < found(0.1) < found(0.2)
+    soft = {"stiffness": [1850.0, *STIFFNESS[1:]], "damping": list(DAMPING)}
+    assert doubt < found(0.02, cuff="compliant") < found(0.02, cuff=soft)
+    ecosystem = HiddenIntentEnv(cuff="compliant").ecosystem
+    share = Filter(0.02).elbow.numbers[NUMBERS.arm_share]
+    forearm, d = ecosystem.changed(person={}).arm().inertia_about_elbow(), ecosystem.device.guide_distance
+    part = forearm * (2.0 * math.pi * 6.0) ** 2 / (STIFFNESS[0] * d**2)
+    assert found(0.02, cuff="compliant") == pytest.approx(math.hypot(doubt, part / share), rel=1e-12)
 
 
 def test_the_usual_load_is_the_mean_of_what_is_drawn():
