@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core import Model
+from dms_core.errors import SimulationError
 from dms_core.estimation import Channel, CompiledFilter, EstimatedConstant, EstimatedInput, FilterSettings
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.settings import InitialDeviations, MotionNoise
@@ -116,7 +117,7 @@ class MuscleEstimator:
         self.arm = elbow.arm()
         self.muscles = self.arm.muscles
         self.lost = 0
-        """Times that the fibres could not be stepped, and were put in balance with their tendons."""
+        """Times that the equations could not be stepped, and fibres were put in balance with their tendons."""
         angles = np.radians(np.arange(-10.0, 160.0, 2.0))
         self._angles = angles
         self._levers = np.array([[elbow.lever(self.arm, m, x) for x in angles] for m in self.muscles])
@@ -168,6 +169,16 @@ class MuscleEstimator:
         system = self.elbow.system(angle, load, activations)
         self.filter = CompiledFilter(Model(system, like=self._model), self._settings())
 
+    def _anew(self, readings: Mapping[str, float]) -> None:
+        """Begin at rest at the present hinge angle, with what is known beside the state."""
+        a = self.filter.arrays
+        rest, known = a.rest.copy(), a.P[-len(a.rest) :, -len(a.rest) :].copy()
+        self._make(readings[ANGLE], float(rest[self._first]), rest[2 : self._first])
+        belief = self.filter.kalman.start()
+        P = belief.P.copy()
+        P[-len(rest) :, -len(rest) :] = known
+        self.filter.begin(replace(belief, P=P, rest=rest))
+
     def _balance(self) -> None:
         """Put the fibres where they are in balance with their tendons, in the belief as it is else."""
         belief = self.filter.belief()
@@ -206,8 +217,11 @@ class MuscleEstimator:
             self.filter.packed.put_rest()
         if not self.filter.try_step(readings):
             self.lost += 1
-            self._balance()
-            self.filter.correct(readings)
+            try:
+                self._balance()
+                self.filter.correct(readings)
+            except SimulationError:
+                self._anew(readings)
         return self._told()
 
     def _told(self) -> MuscleEstimate:

@@ -192,8 +192,10 @@ def filtered(found: MuscleRecording, row: Row, usual: MuscleEstimator, period: f
     return estimates, estimator.lost
 
 
-def study(rows: tuple[Row, ...], population: str, first: int, patients: int, rate: float, tuning: MuscleTuning):  # noqa: ANN201
-    """Scores of each row."""
+def study(
+    rows: tuple[Row, ...], population: str, first: int, patients: int, rate: float, tuning: MuscleTuning
+) -> tuple[dict[Row, Judged], int]:
+    """Errors of each row, and how often fibres were put in balance anew."""
     scores, lost, period = {row: Judged() for row in rows}, 0, 1.0 / rate
     for kind in dict.fromkeys((row.electrodes, row.late) for row in rows):
         env = made(kind[0], population, rate, kind[1])
@@ -210,7 +212,7 @@ def study(rows: tuple[Row, ...], population: str, first: int, patients: int, rat
                 r.name: f"{scores[r].parts[-1]['first_load']:+.2f} kg" for r in rows if (r.electrodes, r.late) == kind
             }
             print(f"patient {k + 1}: {said}, filters begun anew {lost}", flush=True)
-    return {row.name: score.row() for row, score in scores.items()}
+    return scores, lost
 
 
 def main() -> None:
@@ -223,9 +225,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
     rows = CAUSES if given.causes else ROWS
-    found = study(rows, given.population, given.seed, given.patients, given.rate, MuscleTuning())
-    for name, row in found.items():
-        print(name, {k: round(v, 4) for k, v in row.items()})
+    scores, lost = study(rows, given.population, given.seed, given.patients, given.rate, MuscleTuning())
+    found = {row.name: score.row() for row, score in scores.items()}
+    for name, numbers in found.items():
+        print(name, {k: round(v, 4) for k, v in numbers.items()})
+    print(f"times that fibres were put in balance anew: {lost}")
     heads = next(iter(found.values())).keys()
     columns = {h: np.array([r[h] for r in found.values()]) for h in heads}
     write_csv(given.out, {"row": np.arange(1.0, len(found) + 1.0), **columns})
