@@ -32,6 +32,8 @@ DELAY = 0.02
 """Of the electrodes [s]."""
 CELL_NOISE = 1.0
 """Of the load cell between handle and rope [N]."""
+QUIET = 0.002
+"""Noise that is believed of electrodes without any [-]."""
 FIRST_REPETITION = 3.0
 """Time behind which the load is judged [s]."""
 CALIBRATED = {"gain_deviation": 1e-9, "crosstalk": 0.0, "dropping": 1e-9}
@@ -63,6 +65,8 @@ class Row(NamedTuple):
     arms: bool = False
     """Whether body and moment arms are the wearer's."""
     late: bool = True
+    noise: bool = True
+    """Whether electrodes have noise."""
 
 
 ROWS = (
@@ -82,16 +86,22 @@ CAUSES = (
     Row("known load and strength, and true moment arms", load=True, strength=True, arms=True),
     Row("known load and strength, and no delay", load=True, strength=True, late=False),
     Row("known load and strength, and all of these", load=True, strength=True, body=True, arms=True, late=False),
+    Row("the same, and electrodes without noise", "calibrated", False, True, True, True, True, False, False),
 )
 
 
-def made(electrodes: str, population: str, rate: float, late: bool) -> Any:
+def made(row: Row, population: str, rate: float) -> Any:
     """The environment."""
-    noise = True if late else {"emg": {"deviation": 0.03}}
+    noise = True if row.late and row.noise else {"emg": {"deviation": 0.03 if row.noise else 0.0}}
     return gymnasium.make(
         "exo/HiddenIntent-v0", patient=population, observation=("device", "imu", "emg"), control_rate=rate,
-        electrodes=CALIBRATED if electrodes == "calibrated" else None, noise=noise, disable_env_checker=True,
+        electrodes=CALIBRATED if row.electrodes == "calibrated" else None, noise=noise, disable_env_checker=True,
     ).unwrapped  # fmt: skip
+
+
+def kind_of(row: Row) -> tuple[str, bool, bool]:
+    """What rows of one environment have in common."""
+    return row.electrodes, row.late, row.noise
 
 
 def recorded(env: Any, seed: int) -> MuscleRecording:
@@ -182,6 +192,8 @@ def filtered(found: MuscleRecording, row: Row, usual: MuscleEstimator, period: f
     elbow = MuscleElbow(
         device=usual.elbow.device, machine=usual.elbow.machine, person=person, farther=1.0 if row.arms else 1.05
     )
+    if not row.noise:
+        tuning = tuning._replace(emg=QUIET, activation=1.0)
     told = Known(load=row.load, strength=found.strength if row.strength else None)
     estimator = MuscleEstimator(elbow, period, tuning, told, like=usual)
     estimates = []
@@ -197,20 +209,18 @@ def study(
 ) -> tuple[dict[Row, Judged], int]:
     """Errors of each row, and how often fibres were put in balance anew."""
     scores, lost, period = {row: Judged() for row in rows}, 0, 1.0 / rate
-    for kind in dict.fromkeys((row.electrodes, row.late) for row in rows):
-        env = made(kind[0], population, rate, kind[1])
+    for kind in dict.fromkeys(kind_of(row) for row in rows):
+        of_kind = [row for row in rows if kind_of(row) == kind]
+        env = made(of_kind[0], population, rate)
         machine = env.ecosystem.machine
         usual = MuscleEstimator(MuscleElbow(machine=machine, device=env.ecosystem.device), period, tuning)
         for k in range(patients):
             found = recorded(env, first + k)
-            for row in rows:
-                if (row.electrodes, row.late) == kind:
-                    estimates, again = filtered(found, row, usual, period, tuning, first + k)
-                    lost += again
-                    scores[row].add(found, estimates, period)
-            said = {
-                r.name: f"{scores[r].parts[-1]['first_load']:+.2f} kg" for r in rows if (r.electrodes, r.late) == kind
-            }
+            for row in of_kind:
+                estimates, again = filtered(found, row, usual, period, tuning, first + k)
+                lost += again
+                scores[row].add(found, estimates, period)
+            said = {r.name: f"{scores[r].parts[-1]['first_load']:+.2f} kg" for r in of_kind}
             print(f"patient {k + 1}: {said}, filters begun anew {lost}", flush=True)
     return scores, lost
 
