@@ -113,7 +113,7 @@ class CompiledFilter:
         self.arrays.nis[:] = correction.nis, len(correction.residual)
 
     def shown(self) -> tuple[np.ndarray, np.ndarray]:
-        """What all channels should show at the present belief, and its covariance C P C^T, noise and biases left out.
+        """What all channels should show at the present belief, biases included, and its covariance C P C^T.
 
         A channel of which no reading ever comes is a virtual sensor.
 

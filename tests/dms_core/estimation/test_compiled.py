@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import erfcx
 
 from dms_core import Model
 from dms_core.errors import InputError, SimulationError
 from dms_core.estimation import Bias, Channel, EstimatedInput, FilterBatch, FilterSettings, KalmanFilter
 from dms_core.estimation.filter.compiled_filter import CompiledFilter
+from dms_core.estimation.filter.cut import cut_moments
 from dms_core.estimation.filter.forms import CompiledKalmanFilter, filter_of
 from dms_core.estimation.filter.unscented import UnscentedFilter
 from dms_core.model_files.model_file import load
@@ -209,3 +211,28 @@ def test_records_are_filtered_by_compiled_steps_where_they_can():
     alone = CompiledFilter(Model(model), settings)
     alone.step({"goniometer.angle": 1.2, "extensor force.activation": 0.1})
     assert alone.nis[1] == 2
+
+
+def test_virtual_sensors_are_those_of_the_readout():
+    """What channels should show, with the covariance of it, a channel without readings among them."""
+    settings = settings_of("four-bar")
+    quick, names = CompiledFilter(Model(driven_four_bar()), settings), list(settings.channels)
+    for k in range(5):
+        quick.step({names[0]: readings_of("four-bar", np.random.default_rng(k), k)[names[0]]})
+    y, cov = quick.shown()
+    kalman, belief = quick.kalman, quick.belief()
+    expected, C = kalman.expected(belief, names)
+    np.testing.assert_allclose(y, expected, rtol=1e-9)
+    np.testing.assert_allclose(cov, C @ belief.P @ C.T, rtol=1e-7)
+
+
+@pytest.mark.parametrize("z", [3.5, 8.0, 20.0, 29.0])
+def test_what_is_left_in_the_tail_is_told_to_the_last_digits(z):
+    """Mean and variance of a normal distribution below -z, by the hazard in its scaled form."""
+    mean, variance = cut_moments(-np.inf, -z)
+    hazard = np.sqrt(2.0 / np.pi) / erfcx(z / np.sqrt(2.0))
+    assert mean == pytest.approx(-hazard, rel=1e-14)
+    # The reference itself loses z^2 digits of the variance.
+    assert variance == pytest.approx(1.0 - hazard * (hazard - z), rel=1e-14 * z**4)
+    low, spread = cut_moments(z, np.inf)
+    assert (low, spread) == (-mean, variance)
