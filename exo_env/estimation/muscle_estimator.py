@@ -215,13 +215,16 @@ class MuscleEstimator:
         if self.known.load and load is not None:
             a.rest[self._first] = load
             self.filter.packed.put_rest()
-        if not self.filter.try_step(readings):
-            self.lost += 1
-            try:
+        try:
+            if not self.filter.try_step(readings):
+                self.lost += 1
                 self._balance()
                 self.filter.correct(readings)
-            except SimulationError:
-                self._anew(readings)
+            return self._told()
+        except SimulationError:
+            # Not even there have the fibres rates.
+            self.lost += 1
+            self._anew(readings)
         return self._told()
 
     def _told(self) -> MuscleEstimate:
