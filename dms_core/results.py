@@ -28,7 +28,8 @@ class Result(Enum):
     MATRIX_SINGULAR = "The Newton matrix is singular: the equations determine not everything that moves."
     SINGULAR_POSITION = (
         "The mechanism has come to a singular position: rounding would decide on which branch it goes on. A step that "
-        "passes it needs a looser rtol; otherwise remove the branch, as by slightly other lengths."
+        "passes it is a longer one: of a looser rtol, or of the method radau5; otherwise remove the branch, as by "
+        "slightly other lengths."
     )
     TOO_MANY_STEPS = "The largest number of steps was used up before the end time; raise max_steps or loosen rtol."
     RATES_FAILED = "No accelerations and multipliers satisfy the equations at a start or jump."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import subprocess
 import sys
 
@@ -13,15 +14,15 @@ from dms_core.files.config_files import configs
 
 ROOT = configs().parent
 EXAMPLES = ROOT / "examples"
+ARGUMENTS = {"assist_by_gradient": ["1"]}
+"""Of scripts that have a shorter way; the slow test runs them as they are."""
 
 
-def answer(name: str) -> str:
-    """What a script prints."""
-    env = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, str(EXAMPLES / f"{name}.py")]
-    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def answer(name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> str:
+    """What a script prints when it is run as the main module of this process, whose imports are done."""
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", *ARGUMENTS.get(name, [])])
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    return capsys.readouterr().out
 
 
 def numbers(text: str, pattern: str) -> list[float]:
@@ -71,10 +72,22 @@ def test_every_script_is_listed_and_run():
 
 
 @pytest.mark.parametrize("name", list(CHECKS))
-def test_the_answer_is_right(name):
+def test_the_answer_is_right(name, capsys, monkeypatch):
     if name in ("sb3_training", "assist_by_gradient"):
         pytest.importorskip("stable_baselines3")
     if name == "swing_by_gradient":
         pytest.importorskip("torch")
-    said = answer(name)
+    said = answer(name, capsys, monkeypatch)
     assert CHECKS[name](said), said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(CHECKS))
+def test_it_needs_nothing_but_itself(name):
+    """As it is called by hand, in a process that has imported nothing before."""
+    if name in ("sb3_training", "assist_by_gradient", "swing_by_gradient"):
+        pytest.importorskip("stable_baselines3")
+    command, env = [sys.executable, str(EXAMPLES / f"{name}.py")], os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert CHECKS[name](done.stdout), done.stdout

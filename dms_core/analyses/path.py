@@ -111,6 +111,23 @@ class _Follower:
         self.equations = equations
         self.scale = equations.model.tables.values.scale_q
 
+    def first(self, q: np.ndarray, load: float, to: float) -> _Place:
+        """The place where a path begins, with its tangent towards the load factor `to`."""
+        here = self.place(q, load, None)
+        if here.ts * np.sign(to - load) < 0.0:
+            return here._replace(tq=-here.tq, ts=-here.ts, determinant=-here.determinant)
+        return here
+
+    def next(self, here: _Place, length: float, to: float, upwards: float) -> tuple[_Place, bool] | None:
+        """The next place, and whether it is the last one, at the load `to`; None where the step was too long."""
+        there = self.step(here, length)
+        if there is None or self._along(here, there.tq, there.ts) < STRAIGHT:
+            return None
+        if (there.s - to) * upwards < 0.0:
+            return there, False
+        last = self.step(here, length * (to - here.s) / (there.s - here.s), to)
+        return None if last is None else (last, True)
+
     def place(self, q: np.ndarray, s: float, before: _Place | None) -> _Place:
         """A converged position with its tangent, in the direction of the place before."""
         lam, b = balanced(self.equations, q, np.zeros(self.equations.model.n_phi), s)
@@ -224,40 +241,42 @@ def follow_path(
         >>> path = follow_path(truss, ["push"], to=2.0)
         >>> [event.load for event in path.limit_points]
     """
-    if not loads:
-        raise InputError("loads: Expected the names of the loads that grow along the path, got none.")
-    if to == load or not np.isfinite([to, load]).all():
-        raise InputError(f"to: Expected a finite load factor other than the first, {load}, got {to}.")
-    if not longest > 0.0:
-        raise InputError(f"longest: Expected a positive arc length, got {longest}.")
+    _check_range(loads, load, to, longest)
     compiled = model if isinstance(model, Model) else Model(model)
     equations = RestEquations(compiled, loads, time, inputs)
     q, _, iterations = relaxed(equations, equations.unknowns(compiled.start.q if start is None else start), load)
-    follower, upwards = _Follower(equations), np.sign(to - load)
-    here = follower.place(q, load, None)
-    if here.ts * upwards < 0.0:
-        here = here._replace(tq=-here.tq, ts=-here.ts, determinant=-here.determinant)
+    follower = _Follower(equations)
+    here = follower.first(q, load, to)
     points, events = [equilibrium_at(equations, here.q, here.lam, here.s, iterations)], list[Event]()
     length, reached = longest, False
     while len(points) < max_points and not reached:
-        there = follower.step(here, length)
-        if there is None or follower._along(here, there.tq, there.ts) < STRAIGHT:
+        found = follower.next(here, length, to, np.sign(to - load))
+        if found is None:
             length *= 0.5
             if length < FEWEST * longest:
                 break
             continue
-        if (there.s - to) * upwards >= 0.0:
-            there = follower.step(here, length * (to - here.s) / (there.s - here.s), to)
-            if there is None:
-                length *= 0.5
-                continue
-            reached = True
+        there, reached = found
         events += _events(follower, here, there, length)
         points.append(equilibrium_at(equations, there.q, there.lam, there.s, 0))
         here, length = there, min(1.5 * length, longest)
         if progress is not None:
             progress(here.s)
     return EquilibriumPath(tuple(points), tuple(events), reached)
+
+
+def _check_range(loads: Sequence[str], load: float, to: float, longest: float) -> None:
+    """Whether there is a path to follow.
+
+    Raises:
+        InputError: there is none.
+    """
+    if not loads:
+        raise InputError("loads: Expected the names of the loads that grow along the path, got none.")
+    if to == load or not np.isfinite([to, load]).all():
+        raise InputError(f"to: Expected a finite load factor other than the first, {load}, got {to}.")
+    if not longest > 0.0:
+        raise InputError(f"longest: Expected a positive arc length, got {longest}.")
 
 
 def _events(follower: _Follower, here: _Place, there: _Place, length: float) -> list[Event]:

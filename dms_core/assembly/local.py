@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core.assembly.tables import CALLS, WORK
-from dms_core.compiled.arena import floats, ints, matrix, naturals
+from dms_core.compiled.arena import columns_of, floats, ints, matrix, matrix_as_vector, naturals
 from dms_core.compiled.calls import call_entry
 from dms_core.compiled.jit import compiled
 
@@ -24,6 +24,8 @@ class Views(NamedTuple):
     iu: np.ndarray
     iu_ptr: np.ndarray
     row: np.ndarray
+    solved: np.ndarray
+    solved_ptr: np.ndarray
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
@@ -52,11 +54,12 @@ def views(calls, w):
     """What a loop over `calls` needs at each of them."""
     return Views(
         ints(calls, CALLS.kernel), naturals(calls, CALLS.iq), ints(calls, CALLS.iq_ptr), naturals(calls, CALLS.iu),
-        ints(calls, CALLS.iu_ptr), ints(calls, CALLS.row), floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a),
-        matrix(w, WORK.u), floats(w, WORK.lam), floats(w, WORK.mu), floats(w, WORK.r2), floats(w, WORK.gmu),
-        floats(w, WORK.phi), floats(w, WORK.phi_v), floats(w, WORK.phi_a), floats(w, WORK.q_l), floats(w, WORK.v_l),
-        floats(w, WORK.a_l), floats(w, WORK.lam_l), matrix(w, WORK.u_l), floats(w, WORK.r_l), floats(w, WORK.phi_l),
-        matrix(w, WORK.phi_t_l), matrix(w, WORK.G), matrix(w, WORK.W),
+        ints(calls, CALLS.iu_ptr), ints(calls, CALLS.row), naturals(calls, CALLS.solved), ints(calls, CALLS.solved_ptr),
+        floats(w, WORK.q), floats(w, WORK.v), floats(w, WORK.a), matrix(w, WORK.u), floats(w, WORK.lam),
+        floats(w, WORK.mu), floats(w, WORK.r2), floats(w, WORK.gmu), floats(w, WORK.phi), floats(w, WORK.phi_v),
+        floats(w, WORK.phi_a), floats(w, WORK.q_l), floats(w, WORK.v_l), floats(w, WORK.a_l), floats(w, WORK.lam_l),
+        matrix(w, WORK.u_l), floats(w, WORK.r_l), floats(w, WORK.phi_l), matrix(w, WORK.phi_t_l), matrix(w, WORK.G),
+        matrix(w, WORK.W),
     )  # fmt: skip
 
 
@@ -66,6 +69,19 @@ def clear(block, m, n):
     for i in range(m):
         for j in range(n):
             block[i, j] = 0.0
+
+
+@compiled(forceinline=True)
+def clear_rows(w, k, m, n):
+    """block[:m, :n] = 0 for matrix k of the work arrays, and more of these rows where that is quicker."""
+    columns = columns_of(w, k)
+    if columns > 2 * n:
+        clear(matrix(w, k), m, n)
+    else:
+        # Whole rows are one stretch of memory.
+        block = matrix_as_vector(w, k)
+        for i in range(m * columns):
+            block[i] = 0.0
 
 
 @compiled(forceinline=True)
@@ -92,9 +108,9 @@ def evaluate_dynamic(x, calls, e, w, level):
     for i in range(n):
         x.r_l[i] = 0.0
     if level > 0:
-        clear(matrix(w, WORK.Jq), n, n)
-        clear(matrix(w, WORK.Jv), n, n)
-        clear(matrix(w, WORK.Ja), n, n)
+        clear_rows(w, WORK.Jq, n, n)
+        clear_rows(w, WORK.Jv, n, n)
+        clear_rows(w, WORK.Ja, n, n)
     call_entry(x.kernel[e], calls, e, w, level)
     return n
 
@@ -108,18 +124,30 @@ def add_dynamic_rows(x, e, n):
 
 
 @compiled(forceinline=True)
+def add_solved_rows(x, e, n):
+    """As add_dynamic_rows, of the coordinates that are solved for alone."""
+    start, first, end = x.iq_ptr[e], x.solved_ptr[e], x.solved_ptr[e + 1]
+    if end - first == n:
+        add_dynamic_rows(x, e, n)
+        return
+    for p in range(first, end):
+        i = x.solved[p]
+        x.r2[x.iq[start + i]] += x.r_l[i]
+
+
+@compiled(forceinline=True)
 def evaluate_constraint(x, calls, e, w, level):
     """Run the constraint kernel of call e into phi_l, phi_t_l, G and, for level 1, W, H, with its vdot; gives n."""
     n = gather(x, e, level > 0)
     row = x.row[e]
     m = x.row[e + 1] - row
-    clear(x.G, m, n)
+    clear_rows(w, WORK.G, m, n)
     for k in range(m):
         x.lam_l[k] = x.lam[row + k]
         x.phi_l[k] = x.phi_t_l[k, 0] = x.phi_t_l[k, 1] = 0.0
     if level > 0:
-        clear(x.W, m, n)
-        clear(matrix(w, WORK.H), n, n)
+        clear_rows(w, WORK.W, m, n)
+        clear_rows(w, WORK.H, n, n)
     call_entry(x.kernel[e], calls, e, w, level)
     return n
 
@@ -144,6 +172,39 @@ def add_constraint_forces(x, e, n):
         for i in range(n):
             x.r2[x.iq[start + i]] += x.G[k, i] * lam
             x.gmu[x.iq[start + i]] += x.G[k, i] * mu
+
+
+@compiled(forceinline=True)
+def put_solved_values(x, e, n):
+    """As put_constraint_values; coordinates that are not solved for rest."""
+    row, first, end = x.row[e], x.solved_ptr[e], x.solved_ptr[e + 1]
+    if end - first == n:
+        put_constraint_values(x, e, n)
+        return
+    for k in range(x.row[e + 1] - row):
+        rate = x.phi_t_l[k, 0]
+        for p in range(first, end):
+            i = x.solved[p]
+            rate += x.G[k, i] * x.v_l[i]
+        x.phi[row + k], x.phi_v[row + k] = x.phi_l[k], rate
+
+
+@compiled(forceinline=True)
+def add_solved_forces(x, e, n):
+    """As add_constraint_forces, of the coordinates that are solved for alone."""
+    start, row, first, end = x.iq_ptr[e], x.row[e], x.solved_ptr[e], x.solved_ptr[e + 1]
+    if end - first == n:
+        add_constraint_forces(x, e, n)
+        return
+    m = x.row[e + 1] - row
+    for p in range(first, end):
+        i = x.solved[p]
+        at = x.iq[start + i]
+        force, drift = x.r2[at], x.gmu[at]
+        for k in range(m):
+            force += x.G[k, i] * x.lam[row + k]
+            drift += x.G[k, i] * x.mu[row + k]
+        x.r2[at], x.gmu[at] = force, drift
 
 
 @compiled(forceinline=True)

@@ -32,7 +32,7 @@ from dms_core.assembly.tables import Signals, Tables, Work, new_work, signal_tab
 from dms_core.compiled import side_by_side
 from dms_core.compiled.arena import Packed
 from dms_core.compiled.compilation import announce
-from dms_core.compiled.entries import all_calls, moving_calls
+from dms_core.compiled.entries import all_calls, moving_calls, solved_calls
 from dms_core.errors import ModelError, ModelWarning, choices
 from dms_core.linear.rank import independent_rows, minimum_norms, multipliers_of
 from dms_core.model.system import System
@@ -211,8 +211,8 @@ class Model:
         """
         layout, free, solved = self.layout, self.welds.free, solved.astype(np.int32)
         side_by_side.wait_for(ORDER_CODE)
-        dynamics = self._dynamics.values._replace(moving=moving_calls(layout.dynamics, free))
-        constraints = self._constraints.values._replace(moving=moving_calls(layout.constraints, free))
+        dynamics = solved_calls(self._dynamics.values, layout.dynamics, free)
+        constraints = solved_calls(self._constraints.values, layout.constraints, free)
         where = Sampling(layout, dynamics, constraints, signals, free, solved, *sizes, search)
         systems = ordered_systems(where, q, v, t, c0)
         return Tables(
@@ -224,8 +224,10 @@ class Model:
     def _with_orders_of(self, like: Model) -> Tables:
         """Tables with this model's numbers and the other's scatter and elimination orders."""
         known = like.tables.values
-        dynamics = self._dynamics.values._replace(moving=known.dynamics.moving)
-        constraints = self._constraints.values._replace(moving=known.constraints.moving)
+        dynamics, constraints = (
+            own._replace(moving=of.moving, solved=of.solved, solved_ptr=of.solved_ptr)
+            for own, of in ((self._dynamics.values, known.dynamics), (self._constraints.values, known.constraints))
+        )
         scale_q, scale_v = nominal_sizes(self.layout)
         return known._replace(
             dynamics=dynamics, constraints=constraints, sensors=self._sensors.values, scale_q=scale_q, scale_v=scale_v

@@ -6,12 +6,13 @@ r1 = v - qdot - phi_q^T mu        r2 = M vdot + phi_q^T lam - f        r3 = phi 
 import math
 
 from dms_core.assembly.local import (
-    add_constraint_forces,
-    add_dynamic_rows,
+    add_solved_forces,
+    add_solved_rows,
     evaluate_constraint,
     evaluate_dynamic,
     put_acceleration_rows,
     put_constraint_values,
+    put_solved_values,
     views,
 )
 from dms_core.assembly.scatter import (
@@ -69,38 +70,38 @@ def evaluate_constraints(calls, w):
     x = views(calls, w)
     for e in ints(calls, CALLS.moving):
         n = evaluate_constraint(x, calls, e, w, 0)
-        put_constraint_values(x, e, n)
+        put_solved_values(x, e, n)
 
 
 @compiled
 def evaluate_residual(dynamics, constraints, w):
-    """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, of the calls that count as moving; no derivatives."""
+    """r2, gmu, phi and phi_v at the q, v, a, lam, mu, u in w, of what is solved for; no derivatives."""
     x = views(dynamics, w)
     x.r2[:] = 0.0
     x.gmu[:] = 0.0
     for e in ints(dynamics, CALLS.moving):
         n = evaluate_dynamic(x, dynamics, e, w, 0)
-        add_dynamic_rows(x, e, n)
+        add_solved_rows(x, e, n)
     y = views(constraints, w)
     for e in ints(constraints, CALLS.moving):
         n = evaluate_constraint(y, constraints, e, w, 0)
-        put_constraint_values(y, e, n)
-        add_constraint_forces(y, e, n)
+        put_solved_values(y, e, n)
+        add_solved_forces(y, e, n)
 
 
 @compiled(forceinline=True)
 def _dynamic_derivatives(x, calls, e, w):
     """Values of dynamic call e into the residual, its derivatives into the local arrays."""
     n = evaluate_dynamic(x, calls, e, w, 1)
-    add_dynamic_rows(x, e, n)
+    add_solved_rows(x, e, n)
 
 
 @compiled(forceinline=True)
 def _constraint_derivatives(x, calls, e, w):
     """Values and forces of constraint call e into the residual, its derivatives into the local arrays; gives n."""
     n = evaluate_constraint(x, calls, e, w, 1)
-    put_constraint_values(x, e, n)
-    add_constraint_forces(x, e, n)
+    put_solved_values(x, e, n)
+    add_solved_forces(x, e, n)
     return n
 
 

@@ -14,9 +14,12 @@ PART, NEWTON, RATES, BLOCKS = fields(Part), fields(NewtonPattern), fields(RatePa
 @compiled
 def scatter_part(part, e, local, factor, values):
     """values[slot] += factor local[i, j] for the entries of call e."""
-    i, j, slot, ptr = naturals(part, PART.i), naturals(part, PART.j), naturals(part, PART.slot), ints(part, PART.ptr)
-    for k in range(ptr[e], ptr[e + 1]):
-        values[slot[k]] += factor * local[i[k], j[k]]
+    ptr = ints(part, PART.ptr)
+    first, end = ptr[e], ptr[e + 1]
+    if first < end:
+        i, j, slot = naturals(part, PART.i), naturals(part, PART.j), naturals(part, PART.slot)
+        for k in range(first, end):
+            values[slot[k]] += factor * local[i[k], j[k]]
 
 
 @compiled

@@ -34,6 +34,9 @@ class Calls(NamedTuple):
     """First row of each call; row[e + 1] ends it, (n_calls + 1,)."""
     moving: np.ndarray
     """Calls that see a coordinate which is solved for; a step evaluates these only."""
+    solved: np.ndarray
+    """Local places of the coordinates of each call that are solved for; all others of a moving call rest."""
+    solved_ptr: np.ndarray
 
 
 class Signals(NamedTuple):

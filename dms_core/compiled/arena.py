@@ -108,6 +108,18 @@ def matrix(table, k):
 
 
 @compiled(makes_arrays=True)
+def matrix_as_vector(table, k):
+    """Field k, a matrix of floats, as a vector of all its numbers, row by row."""
+    return carray(_float64(table[k, 0]), (table[k, 1] * table[k, 2],))
+
+
+@compiled
+def columns_of(table, k):
+    """Number of columns of field k."""
+    return table[k, 2]
+
+
+@compiled(makes_arrays=True)
 def ints(table, k):
     """Field k as a vector of 64-bit integers."""
     return carray(_int64(table[k, 0]), (table[k, 1],))

@@ -193,6 +193,7 @@ def call_tables(calls: list[Call], signature: Any) -> Calls:
         *flat([c.placement.numbers for c in calls], np.float64),
         np.array([c.row for c in calls] + [sum(c.rows for c in calls)], np.int64),
         np.arange(len(calls)),
+        *flat([np.arange(len(c.iq)) for c in calls], np.int32),
     )
 
 
@@ -230,3 +231,9 @@ def all_calls(layout: Layout) -> tuple[Calls, Calls, Calls]:
 def moving_calls(calls: list[Call], free: np.ndarray) -> np.ndarray:
     """Numbers of the calls that see a coordinate which is solved for."""
     return np.array([e for e, c in enumerate(calls) if np.isin(c.iq, free).any()], np.int64)
+
+
+def solved_calls(tables: Calls, calls: list[Call], free: np.ndarray) -> Calls:
+    """The same tables, of which a step evaluates what belongs to the coordinates that are solved for."""
+    solved, ptr = flat([np.flatnonzero(np.isin(c.iq, free)) for c in calls], np.int32)
+    return tables._replace(moving=moving_calls(calls, free), solved=solved, solved_ptr=ptr)

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -62,7 +62,8 @@ def write_csv(
 
     Args:
         path: of the file.
-        columns: by name, shape (n,) each; or a function that gives the same in parts, one below the other.
+        columns: by name, shape (n,) each, of numbers or of words; or a function that gives the same in parts, one below
+            the other.
 
     Raises:
         InputError: a name holds a line break.
@@ -72,8 +73,8 @@ def write_csv(
         for k, part in enumerate((columns,) if isinstance(columns, Mapping) else columns()):
             if k == 0:
                 file.write(_head(list(part)))
-            table = np.column_stack([np.asarray(column, float) for column in part.values()])
-            file.writelines((",".join(format(x, DIGITS) for x in row) + "\n").encode("ascii") for row in table)
+            table = [np.asarray(column, None if _words(column) else float) for column in part.values()]
+            file.writelines(f"{','.join(map(_cell, row))}\n".encode() for row in zip(*table, strict=True))
 
     write_file(path, content)
 
@@ -115,12 +116,27 @@ def check_size(option: str, seconds: float, sample: float, columns: int) -> None
         )
 
 
+def _words(column: np.ndarray) -> bool:
+    """Whether a column holds words."""
+    return np.asarray(column).dtype.kind == "U"
+
+
+def _cell(value: Any) -> str:
+    """A word, or a number with DIGITS."""
+    return _quoted([value]) if isinstance(value, str) else format(value, DIGITS)
+
+
 def _head(names: list[str]) -> bytes:
     """The first line."""
     check_columns(names)
+    return f"{_quoted(names)}\n".encode("utf-8", "backslashreplace")
+
+
+def _quoted(cells: Sequence[str]) -> str:
+    """Cells of a line; those with commas or quotes are quoted."""
     line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(names)
-    return line.getvalue().encode("utf-8", "backslashreplace")
+    csv.writer(line, lineterminator="").writerow(cells)
+    return line.getvalue()
 
 
 def write_json(path: str | Path, content: Any) -> None:

@@ -4,7 +4,8 @@ Right-looking elimination (Duff, Erisman and Reid 2017, ch. 10): step k divides 
 subtracts multiples of its row from theirs. All targets are tabulated (symbolic.py), so that a factorisation is one
 pass through a list of blocks of eight numbers. The storage array `a` holds the matrix before (zeroed, then
 a[tables.position[e]] += value[e]), and after it L below and U right of the diagonal, with the inverse of each pivot in
-its place. Everything is compiled to be called from compiled code; the same input gives the same bits.
+its place; behind them, where blocks are sparse, the same numbers in the order in which a solve meets them. Everything
+is compiled to be called from compiled code; the same input gives the same bits.
 
 Numbers are real, or all arrays are complex; storage is then asked for twice as many reals, and seen as complex:
 storage(2 * tables.size).view(complex).
@@ -20,6 +21,7 @@ from dms_core.linear.symbolic import LuTables
 
 _U = np.uint64
 _8 = np.uint64(WIDTH)
+_32, _LOW = np.uint64(32), np.uint64(2**32 - 1)
 _BLOCK = np.uint64(3)  # log2(WIDTH): from an offset to the number of its block
 
 
@@ -80,20 +82,46 @@ def factor(tables, a, work):
             for block in range(diagonal + _8, end, _8):
                 subtract(a, _U(tables.target[t]), a, block, multiplier)
                 t += _U(1)
+    if tables.move.shape[0] > 0:
+        _line_up(tables, a)
     return smallest, where
 
 
-@compiled(fastmath={"contract"})
-def solve(tables, a, b, x, work):
-    """x of A x = b from the factors in a; b and x may be the same array.
+@compiled(forceinline=True)
+def _line_up(tables, a):
+    """Put behind the blocks: entries of L, entries of U over the pivot of their row, inverse pivots."""
+    numbers, moves = _U(tables.numbers), tables.move.shape[0]
+    pivots = numbers + _U(moves)
+    for k in range(tables.n):
+        a[pivots + _U(k)] = a[_U(tables.diagonal[k]) + _U(tables.lane[k])]
+    for e in range(tables.lower):
+        a[numbers + _U(e)] = a[tables.place[e]]
+    for e in range(tables.lower, moves):
+        a[numbers + _U(e)] = a[tables.place[e]] * a[pivots + (_U(tables.move[e]) >> _32)]
 
-    Args:
-        tables: LuTables of the pattern.
-        a: factors, shape (tables.size,).
-        b: right-hand side, shape (n,).
-        x: solution, shape (n,).
-        work: overwritten, shape (tables.work_size,).
-    """
+
+@compiled(fastmath={"contract"}, forceinline=True)
+def _solve_by_moves(tables, a, b, x, work):
+    """As solve, one entry of L and U after the other."""
+    numbers, moves = _U(tables.numbers), tables.move.shape[0]
+    pivots = numbers + _U(moves)
+    for k in range(tables.n):
+        work[k] = b[tables.row_of[k]]
+    for e in range(tables.lower):
+        move = _U(tables.move[e])
+        work[move >> _32] -= a[numbers + _U(e)] * work[move & _LOW]
+    for k in range(tables.n):
+        work[k] *= a[pivots + _U(k)]
+    for e in range(tables.lower, moves):
+        move = _U(tables.move[e])
+        work[move >> _32] -= a[numbers + _U(e)] * work[move & _LOW]
+    for k in range(tables.n):
+        x[tables.col_of[k]] = work[k]
+
+
+@compiled(fastmath={"contract"}, forceinline=True)
+def _solve_by_blocks(tables, a, b, x, work):
+    """As solve, row by row."""
     n = tables.n
     work[:] = 0.0
     for k in range(n):
@@ -115,6 +143,23 @@ def solve(tables, a, b, x, work):
         y *= a[diagonal + lane]
         work[slot] = y
         x[tables.col_of[k]] = y
+
+
+@compiled
+def solve(tables, a, b, x, work):
+    """x of A x = b from the factors in a; b and x may be the same array.
+
+    Args:
+        tables: LuTables of the pattern.
+        a: factors, shape (tables.size,).
+        b: right-hand side, shape (n,).
+        x: solution, shape (n,).
+        work: overwritten, shape (tables.work_size,).
+    """
+    if tables.move.shape[0] > 0:
+        _solve_by_moves(tables, a, b, x, work)
+    else:
+        _solve_by_blocks(tables, a, b, x, work)
 
 
 @compiled(fastmath={"contract"})

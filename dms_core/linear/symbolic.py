@@ -7,6 +7,10 @@ columns cost dearly. Two freedoms are used to have few blocks:
 - steps that do not touch each other may be exchanged without any change of the fill: each is put right after the
   last step that it depends on (depth first through the graph of L and U);
 - a block may end early: the borders that cost least are found exactly, by dynamic programming.
+
+A solve meets each number once, and waits for the sum of every block. Where blocks are sparse, the entries of L and U
+stand for it one by one in a list of moves, sorted by how many moves each has to wait for, so that neighbours in the
+list hardly ever wait for each other (level scheduling: Anderson and Saad 1989).
 """
 
 from __future__ import annotations
@@ -24,6 +28,10 @@ BLOCK_COST, GROUP_COST = 1.0, 3.0
 """Cost of one stored block (a load in each solve) and one group of columns, in block updates of the factorisation."""
 
 
+SPARSE = 3.5
+"""Entries of L + U a block up to which a solve goes entry by entry; at 4 both ways take the same time."""
+
+
 class LuTables(NamedTuple):
     """Constant tables of one pattern. The step k eliminates entry (row_of[k], col_of[k]) of the caller's matrix.
 
@@ -33,7 +41,8 @@ class LuTables(NamedTuple):
     n: int
     """Unknowns."""
     size: int
-    """Length of the storage array a; the last block of eight is a waste bin for numbers that are to be dropped."""
+    """Length of the storage array a: blocks, numbers of the moves, and a last block of eight, which is a waste bin for
+    numbers that are to be dropped."""
     work_size: int
     """Length of the work array of factor and of the solves."""
     updates: int
@@ -59,6 +68,14 @@ class LuTables(NamedTuple):
     """Entries of L below each pivot, shape (n,)."""
     target: np.ndarray
     """Offsets of the blocks that are updated, in order: by step, by row of L, by block of U, shape (updates,)."""
+    lower: int
+    """Number of moves of L; those of U follow. There are none where a solve goes by blocks."""
+    numbers: int
+    """Offset of the numbers of all moves, which factor puts behind the blocks, then of the inverse pivots."""
+    move: np.ndarray
+    """(step that is changed) 2^32 + (step that it is changed by) of each move, int64, shape (fill - n,) or (0,)."""
+    place: np.ndarray
+    """Offset of each move's entry in the blocks."""
 
 
 class Fill(NamedTuple):
@@ -304,11 +321,15 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
     target = _targets(n, fill, first, diagonal, end, group, int((below * (end - diagonal)).sum()) // WIDTH)
     right = fill.start[1:] - fill.diagonal
     position = _positions(_inverse(row_perm)[rows], _inverse(col_perm)[cols], slot, first, group)
+    lower, goal, source = _moves(n, fill) if fill.column.size <= SPARSE * group.size else NO_MOVES
+    place = _positions(goal, source, slot, first, group)
+    numbers = group.size * WIDTH
     # Unsigned indices spare the compiled loops numba's test for negative ones.
-    unsigned = [x.astype(np.uint32) for x in (slot, lane, first, diagonal, end, group, below, target)]
+    tables = (slot, lane, first, diagonal, end, group, below, target)
+    slot, lane, first, diagonal, end, group, below, target = (x.astype(np.uint32) for x in tables)
     return LuTables(
         n,
-        (group.size + 1) * WIDTH,
+        -(-(numbers + (place.size + n if place.size else 0)) // WIDTH) * WIDTH + WIDTH,
         int(leading.sum()) * WIDTH,
         target.size,
         fill.column.size,
@@ -316,8 +337,47 @@ def _tables(n, rows, cols, row_perm, col_perm, fill: Fill, leading: np.ndarray) 
         position,
         np.asarray(row_perm).astype(np.uint32),
         np.asarray(col_perm).astype(np.uint32),
-        *unsigned,
+        slot,
+        lane,
+        first,
+        diagonal,
+        end,
+        group,
+        below,
+        target,
+        lower,
+        numbers,
+        goal << 32 | source,
+        place.astype(np.uint32),
     )
+
+
+NO_MOVES = 0, np.zeros(0, np.int64), np.zeros(0, np.int64)
+
+
+def _moves(n, fill: Fill) -> tuple[int, np.ndarray, np.ndarray]:
+    """(number of moves of L, steps that are changed, steps that they are changed by): moves of L, then those of U."""
+    row, column = np.repeat(np.arange(n), np.diff(fill.start)), fill.column
+    down, up = _depths(n, fill.start, column, fill.diagonal)
+    lower, upper = np.flatnonzero(column < row), np.flatnonzero(column > row)
+    lower = lower[np.lexsort((row[lower], column[lower], down[column[lower]]))]
+    upper = upper[np.lexsort((row[upper], -column[upper], up[column[upper]]))]
+    order = np.concatenate([lower, upper])
+    return lower.size, row[order], column[order]
+
+
+@compiled(makes_arrays=True)
+def _depths(n, start, column, diagonal):
+    """Length of the longest chain of moves that a step waits for, in the solve with L and in that with U."""
+    down, up = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    for i in range(n):
+        for p in range(start[i], diagonal[i]):
+            down[i] = max(down[i], down[column[p]] + 1)
+    for r in range(n):
+        i = n - 1 - r
+        for p in range(diagonal[i] + 1, start[i + 1]):
+            up[i] = max(up[i], up[column[p]] + 1)
+    return down, up
 
 
 @compiled(makes_arrays=True)

@@ -29,7 +29,13 @@ from dms_core.model.constraints import (
     Spherical,
     Universal,
 )
-from dms_core.model.contact import CylinderContact, SphereContact, SphereCylinderContact, SpherePairContact
+from dms_core.model.contact import (
+    CylinderContact,
+    CylinderPairContact,
+    SphereContact,
+    SphereCylinderContact,
+    SpherePairContact,
+)
 from dms_core.model.control import (
     DelayedError,
     ImpedanceController,
@@ -117,6 +123,7 @@ __all__ = [
     "ContactSensor",
     "CoordinateSensor",
     "CylinderContact",
+    "CylinderPairContact",
     "Cylindrical",
     "DcMotor",
     "DelayedError",

@@ -34,7 +34,7 @@ def sensitivity(
     stats: FileOut | None = None,
     overwrite: bool = False,
 ) -> int:
-    """Differentiate a run from the assembled start; write a row an output, with its value and a column for each --by.
+    """Differentiate a run from the assembled start; write a row an output: name, value and a column for each --by.
 
     Args:
         model: model file (YAML).
@@ -68,8 +68,8 @@ def sensitivity(
                 values = run.value()
             except SimulationError as error:
                 return gave_up(error)
-        write_csv(out, {"value": values, **dict(zip(by, found.T, strict=True))})
         rows = [*of, *(f"integral of {name}" for name in integral_of)]
+        write_csv(out, {"of": np.array(rows), "value": values, **dict(zip(by, found.T, strict=True))})
         if stats is not None:
             write_json(stats, {"of": rows, "by": list(by), "value": values.tolist(), "derivative": found.tolist(),
                                "steps": world.stats().steps, "method": method})  # fmt: skip

@@ -52,6 +52,8 @@ class Clock(NamedTuple):
     """Largest of the relative pivots of the Newton matrix since its order of elimination was chosen [-]."""
     singular_pivot: int
     """Relative pivot below which the position is known to be nearly singular; 0 where it is regular [-]."""
+    landed: int
+    """Time of the last landing."""
 
 
 class Counts(NamedTuple):

@@ -219,11 +219,67 @@ def find_rates(m, s, o, c0):
 
 
 @compiled
+def wants_another_order(m, s, o, code, failures):
+    """Whether an attempt failed in a way that another order of elimination, or another position, may mend."""
+    fixed = o.fixed_step > 0.0
+    if code != NEWTON.converged and (fixed or failures > 1) and ordered_for_another_size(m, s):
+        return True
+    return failures == HELP and not fixed and may_be_singular(m, s)
+
+
+@compiled
+def size_behind_failure(s, o, h, code, error):
+    """Count a failed attempt; gives the size of the next one, from what was wrong."""
+    count = ints(s, STATE.counts)
+    if code == NEWTON.converged:
+        count[COUNTS.rejected_error] += 1
+        power = -1.0 / ORDER_OF_ERROR if o.method == METHOD.radau5 else -1.0 / 3.0
+        return h * max(SHRINK, min(0.9, SAFETY * error**power))
+    count[COUNTS.rejected_newton] += 1
+    count[COUNTS.stale] = 1
+    return h * (0.5 if o.method == METHOD.radau5 else 0.25)
+
+
+@compiled
+def find_slopes_anew(m, s):
+    """Rates where a step begins; False if there are none.
+
+    Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
+    """
+    set_inputs(m, s, floats(s, STATE.clock)[CLOCK.t], False)
+    return run_rates(m, s, PARTS.consistent_rates, 0.0)
+
+
+@compiled
+def find_rates_behind(m, s, o, started, stop, landed, kept):
+    """Rates behind an accepted step, where somebody asks for them, and a landing's clock; False if there are none."""
+    c0 = land(s, o, stop) if landed else 0.0
+    # Methods without a past want rates between two landings only for a record.
+    wanted_rates = started if o.method == METHOD.bdf2 else kept or landed
+    return not wanted_rates or find_rates(m, s, o, c0)
+
+
+@compiled
+def choose_next_size(m, s, o, h, wanted, error, iterations, equal, landed, first_try):
+    """Size that the next step is to have, behind a step of size h that was to have had the size `wanted`."""
+    clock = floats(s, STATE.clock)
+    # A step cut short by a landing says little about the size that the motion allows.
+    cut_short = h < wanted and first_try
+    if not equal:
+        size = size_behind(m, s, o, h, error, iterations)
+        clock[CLOCK.h_wanted] = max(size, wanted) if cut_short else size
+        return
+    clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
+    if landed or not first_try:
+        clock[CLOCK.h_wanted] = max(resize(h, clock[CLOCK.worst], iterations), wanted if cut_short else 0.0)
+        clock[CLOCK.worst] = 0.0
+
+
+@compiled
 def one_step(m, s, o, stop, kept):
     """Attempts until one step is accepted; gives OUTCOME.done or what went wrong. `kept`: the step is recorded."""
-    clock, count, fixed = floats(s, STATE.clock), ints(s, STATE.counts), o.fixed_step > 0.0
-    started = count[COUNTS.restart] == 1 or o.method == METHOD.sdirk2
-    power = -1.0 / ORDER_OF_ERROR if o.method == METHOD.radau5 else -1.0 / 3.0
+    clock, fixed = floats(s, STATE.clock), o.fixed_step > 0.0
+    started = ints(s, STATE.counts)[COUNTS.restart] == 1 or o.method == METHOD.sdirk2
     set_weights(m, s, o)
     wanted = o.fixed_step if fixed else min(clock[CLOCK.h_wanted], o.h_max)
     if not fixed and wanted < o.h_min:
@@ -232,7 +288,7 @@ def one_step(m, s, o, stop, kept):
         wanted = min(wanted, GROW * clock[CLOCK.h_before])
     rest = stop - clock[CLOCK.t]
     equal = o.method == METHOD.sdirk2 and not fixed and rest <= NEAR * wanted
-    first_try, failures, leaps, before_leap = True, 0, 0, 0.0
+    failures, leaps, before_leap = 0, 0, 0.0
     while True:
         h = landing_size(wanted, rest, fixed, equal)
         code, iterations, error, c0 = try_step(m, s, o, h, started)
@@ -243,64 +299,45 @@ def one_step(m, s, o, stop, kept):
         if code == NEWTON.converged and (error <= (SINGULAR_ERROR if passing else 1.0) or fixed):
             break
         failures += 1
-        if (code != NEWTON.converged and (fixed or failures > 1) and ordered_for_another_size(m, s)) or (
-            failures == HELP and not fixed and may_be_singular(m, s)
-        ):
+        if wants_another_order(m, s, o, code, failures):
             clock[CLOCK.h_wanted] = h
             return OUTCOME.matrix_singular
-        if code == NEWTON.converged:
-            count[COUNTS.rejected_error] += 1
-            wanted = h * max(SHRINK, min(0.9, SAFETY * error**power))
-        else:
-            count[COUNTS.rejected_newton] += 1
-            count[COUNTS.stale] = 1
-            wanted = h * (0.5 if o.method == METHOD.radau5 else 0.25)
-            # Slopes of the step before are as good as its tolerance only; a shorter step from them starts no better.
-            if first_try and o.method == METHOD.sdirk2:
-                set_inputs(m, s, clock[CLOCK.t], False)
-                if not run_rates(m, s, PARTS.consistent_rates, 0.0):
-                    return OUTCOME.rates_failed
+        wanted = size_behind_failure(s, o, h, code, error)
+        if code != NEWTON.converged and failures == 1 and o.method == METHOD.sdirk2 and not find_slopes_anew(m, s):
+            return OUTCOME.rates_failed
         if not fixed and nearly_singular(s):
             # A shorter step would end no farther from the singular position: one that passes it may do.
             before_leap = before_leap if leaps > 0 else h
             wanted = before_leap * (LEAPS[leaps] if leaps < len(LEAPS) else 0.6)
             leaps = leaps + 1 if leaps < len(LEAPS) else 0
-        first_try = False
         if fixed or wanted < o.h_min:
             return OUTCOME.step_too_small if code == NEWTON.converged else OUTCOME.newton_failed
     if nearly_singular(s):
         error = min(error, KEEPING)
     note_errors(s)
     accept(s, h, c0, started)
-    if h == rest:
-        land(s, stop)
-    # Methods without a past want rates between two landings only for a record.
-    wanted_rates = started if o.method == METHOD.bdf2 else kept or h == rest
-    if wanted_rates and not find_rates(m, s, o, c0 if h == rest and o.method == METHOD.sdirk2 else 0.0):
-        return OUTCOME.rates_failed
-    if equal:
-        clock[CLOCK.worst] = max(clock[CLOCK.worst], error)
-        if h == rest or not first_try:
-            clock[CLOCK.h_wanted] = max(
-                resize(h, clock[CLOCK.worst], iterations),
-                wanted if h < wanted and first_try else 0.0,
-            )
-            clock[CLOCK.worst] = 0.0
-    elif not fixed:
-        size = size_behind(m, s, o, h, error, iterations)
-        # A step cut short by a landing says little about the size that the motion allows.
-        clock[CLOCK.h_wanted] = max(size, wanted) if h < wanted and first_try else size
-    return OUTCOME.done
+    if not fixed:
+        choose_next_size(m, s, o, h, wanted, error, iterations, equal, h == rest, failures == 0)
+    return OUTCOME.done if find_rates_behind(m, s, o, started, stop, h == rest, kept) else OUTCOME.rates_failed
 
 
 @compiled
-def land(s, stop):
-    """Set the clock exactly; behind a jump of an input the method starts afresh."""
-    floats(s, STATE.clock)[CLOCK.t] = stop
+def land(s, o, stop):
+    """Set the clock exactly; behind a jump of an input the method starts afresh.
+
+    Gives c0 of the next steps of SDIRK2, for which a matrix is made where they begin, if the next landing is as far off
+    as this one was from the last; 0 for another method.
+    """
+    clock = floats(s, STATE.clock)
+    span, clock[CLOCK.landed], clock[CLOCK.t] = stop - clock[CLOCK.landed], stop, stop
     jumps = floats(inner(s, STATE.signals), SIGNALS.jumps)
     for k in range(jumps.shape[0]):
         if jumps[k] == stop:
             ints(s, STATE.counts)[COUNTS.restart] = 1
+    if o.method != METHOD.sdirk2:
+        return 0.0
+    h = o.fixed_step if o.fixed_step > 0.0 else min(clock[CLOCK.h_wanted], o.h_max)
+    return 1.0 / (GAMMA * landing_size(h, span, o.fixed_step > 0.0, o.fixed_step <= 0.0 and span <= NEAR * h))
 
 
 @compiled

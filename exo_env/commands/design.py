@@ -137,7 +137,7 @@ def _searched(
     options = SolverOptions(rtol=RTOL)
     found = search(space, who, lowered, options, iterations, _say)
     better = space.design(found.x)
-    _write(out, better)
+    _write(out, better, _origin(found, lowered, len(who)))
     if found.stopped:
         raise Stopped(_kept(found, outputs.where(out)))
     named = [("designed on", who), ("held out", others)]
@@ -158,11 +158,17 @@ def _kept(found: Found, where: Path) -> str:
     )
 
 
-def _write(out: Path, design: Design) -> None:
+def _origin(found: Found, lowered: Objective, patients: int) -> str:
+    """The comment that heads the files of a found device."""
+    change = f"from {found.start:.4g} to {found.value:.4g} {lowered.unit}"
+    return f"# Found by 'python -m exo_env design' for the least {lowered.title}: {change} over {patients} patients.\n"
+
+
+def _write(out: Path, design: Design, origin: str) -> None:
     """The device, and the cuff that goes with it."""
-    write_text(out / "device.yaml", yaml_of(design.device.model_dump(mode="json")))
+    write_text(out / "device.yaml", origin + yaml_of(design.device.model_dump(mode="json")))
     if design.cuff is not None:
-        write_text(out / "cuff.yaml", yaml_of(design.cuff.model_dump(mode="json")))
+        write_text(out / "cuff.yaml", origin + yaml_of(design.cuff.model_dump(mode="json")))
 
 
 def _draw(out: Path, today: Design, found: Design) -> None:

@@ -19,13 +19,28 @@ import numpy as np
 
 from dms_core import Model, Simulation, SolverOptions, simulate
 from tests.benchmarks import csv_file
+from tests.benchmarks import flexible_reference as flexible
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.chain_reference import TIP
 from tests.benchmarks.peer_table import MEASURED, Figure, PeerTable, cost_at
-from tests.benchmarks.problems import ANGLE, ARM_TASKS, arm, chain, chain_error, chain_gap, whole_system
+from tests.benchmarks.problems import (
+    ANGLE,
+    ARM_TASKS,
+    arm,
+    beam,
+    chain,
+    chain_error,
+    chain_gap,
+    node_error,
+    slider_crank,
+    whole_system,
+)
 
 TARGET = 1e-4
 """Error at which costs are compared [rad]."""
+BEAM_TARGET, CRANK_TARGET = 2e-4, 5e-6
+"""The same for a place of the flexible mechanisms [m]: 32 elements leave 9e-5 by themselves."""
+METHODS = ("bdf2", "sdirk2", "radau5")
 Row = tuple[str, str, float, float, float]
 """System, setting, error, ms, gap [m]."""
 
@@ -95,21 +110,68 @@ def bench_precision(title: str, system: str, model: Model, seconds: float, toler
     return rows
 
 
-def compare(system: str, rows: list[Row], peers: PeerTable) -> None:
+def bench_flexible(quick: bool, peers: PeerTable) -> list[Row]:
+    """Beam of 32 elements and slider-crank, by each method; then steps of 1 ms over the number of elements."""
+    n, tolerances = flexible.BEAM_ELEMENTS, [1e-2, 1e-3] if quick else [1e-1, 1e-2, 1e-3, 1e-4]
+    print(f"\nBeam of {n} elements, 1 s, in space (Exudyn: in the plane)")
+    rows = _flexible(f"beam {n}", Model(beam(n)), f"boom.node{n}", tolerances, (4e-3, 2e-3, 1e-3))
+    compare(f"beam {n}", rows, peers, BEAM_TARGET, "m")
+    print("\nSlider-crank with a flexible rod of 4 elements, 0.2 s, in space (Exudyn: in the plane)")
+    rod = _flexible("slider-crank", Model(slider_crank(4)), "rod.node2", tolerances[:3], (4e-4, 2e-4, 1e-4))
+    rows += rod
+    compare("slider-crank", rod, peers, CRANK_TARGET, "m")
+    print(f"\nBeam, bdf2 at h = 1 ms; Exudyn's trapezoidal rule with linear elements\n    {peers.origin('growth 8')}")
+    print(f"{'elements':>8} {'ours us/step':>13} {'tip m':>8} | {'Exudyn us/step':>14} {'tip m':>8} {'ratio':>6}")
+    for n in [8, 32] if quick else [4, 8, 16, 32, 64]:
+        seconds, error = _swing(Model(beam(n)), SolverOptions(fixed_step=1e-3), f"boom.node{n}")
+        rows.append((f"growth {n}", "h=0.001", error, seconds * 1e3, math.nan))
+        other = "".join(f" | {f.ms:14.1f} {f.error:8.1e} {f.ms / seconds / 1e3:6.2f}" for f in peers.of(f"growth {n}"))
+        print(f"{n:8d} {seconds * 1e3:13.1f} {error:8.1e}{other}", flush=True)
+    return rows
+
+
+def _swing(model: Model, options: SolverOptions, node: str) -> tuple[float, float]:
+    """Normalised CPU seconds a simulated second, and the error of a node at the end [m]."""
+    is_beam = model.system.name == "beam"
+    seconds = flexible.BEAM_SECONDS if is_beam else flexible.CRANK_SECONDS
+
+    def run(simulation: Simulation) -> Simulation:
+        if not simulation.advance(seconds):
+            raise RuntimeError(f"{model.system.name}: the solver failed")
+        return simulation
+
+    used, simulation = normalised(run, 3, prepare=lambda: Simulation(model, options))
+    return used / seconds, node_error(simulation, node, flexible.BEAM_TIP if is_beam else flexible.ROD_MIDDLE)
+
+
+def _flexible(system: str, model: Model, node: str, tolerances: list[float], steps: tuple[float, ...]) -> list[Row]:
+    """Rows of one model by all methods, with error control and in steps of one size [s]."""
+    rows: list[Row] = []
+    for method in METHODS:
+        options = [(f"rtol={x:g}", SolverOptions(method=method, rtol=x)) for x in tolerances]
+        options += [(f"h={x:g}", SolverOptions(method=method, fixed_step=x)) for x in steps]
+        for said, chosen in options:
+            seconds, error = _swing(model, chosen, node)
+            rows.append((system, f"{method} {said}", error, seconds * 1e3, math.nan))
+            print(f"{rows[-1][1]:28} {error:10.1e} m {seconds * 1e3:11.2f} ms CPU / s", flush=True)
+    return rows
+
+
+def compare(system: str, rows: list[Row], peers: PeerTable, target: float = TARGET, unit: str = "rad") -> None:
     """Costs at the target error, log-log between settings; a cheapest run that is more exact is not made cheaper."""
-    ours, figures = cost_at([(r[2], r[3]) for r in rows], TARGET), peers.of(system)
-    print(f"    at {TARGET:g} rad: ours {ours:.2f} ms a simulated second; others {peers.origin(system)}")
+    ours, figures = cost_at([(r[2], r[3]) for r in rows], target), peers.of(system)
+    print(f"    at {target:g} {unit}: ours {ours:.2f} ms a simulated second; others {peers.origin(system)}")
     for program in sorted({f.program for f in figures}):
         mine = [f for f in figures if f.program == program]
         for kind in sorted({_kind(f) for f in mine}):
-            ms = cost_at([(f.error, f.ms) for f in mine if _kind(f) == kind], TARGET)
+            ms = cost_at([(f.error, f.ms) for f in mine if _kind(f) == kind], target)
             said = "never as exact" if math.isnan(ms) else f"{ms:8.1f} ms, ratio {ms / ours:6.1f}"
             print(f"    {program}, {kind:28} {said}")
 
 
 def _kind(figure: Figure) -> str:
-    """A setting without its step or accuracy."""
-    return figure.setting.partition(" accuracy")[0].partition(" h=")[0]
+    """A setting without its step, accuracy or number of elements."""
+    return figure.setting.partition(" accuracy")[0].partition(" h=")[0].partition(" n=")[0]
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -129,6 +191,7 @@ def main(arguments: list[str] | None = None) -> None:
     title = "Subject, exoskeleton and gym machine, scenario 3 (Exudyn: a comparable, simpler system of 8 bodies)"
     tolerances = [1e-2, 1e-3] if quick else [1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
     rows += bench_precision(title, "elbow", model, seconds, tolerances, peers)
+    rows += bench_flexible(quick, peers)
     if given.out:
         csv_file.write(given.out, ("system", "setting", "error", "ms", "gap_m"), rows)
 

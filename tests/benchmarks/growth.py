@@ -1,8 +1,9 @@
-"""How the cost of a step grows with the size of a problem: links, worlds, muscles.
+"""How the cost of a step grows with the size of a problem: links, elements of a beam, worlds, muscles.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/growth.py [--links ...] [--worlds ...] [--muscles ...]
+    OMP_NUM_THREADS=1 python tests/benchmarks/growth.py [--links ...] [--elements ...] [--worlds ...] [--muscles ...]
 
 links    the hanging chain of N links, 13 N unknowns, fixed steps of 1 ms; CPU time
+elements the swinging beam of flexible_reference.py with N elements, fixed steps of 1 ms; CPU time
 worlds   a batch of N environments over whole episodes, a control period of one world; 1 thread in CPU time, 2 in wall
          time. Every world has one of the same 16 patients with the same actions, so that each N does the same work a
          world; where N is less than 16, several batches are timed. Beginning an episode is not timed.
@@ -10,7 +11,7 @@ muscles  arm26 with its six muscles repeated, each of a share of the force, so t
          of 1 ms; CPU time
 
 All scaled by calibration.py. Slopes are those of log cost over log size: from one size to the next, and of a straight
-line through all sizes from 8 (from 12 muscles). Links and muscles should have at most 1.1; worlds should have 0.
+line through all sizes from 8 (from 12 muscles): links, elements and muscles should have at most 1.1, worlds 0.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from exo_env.envs.elbow_lift import ElbowLiftVectorEnv
 from tests.benchmarks import csv_file
 from tests.benchmarks.calibration import normalised
 from tests.benchmarks.env_speed import actions_of
-from tests.benchmarks.problems import ARM_TASKS, START_ACTIVATION, chain
+from tests.benchmarks.problems import ARM_TASKS, START_ACTIVATION, beam, chain
 
 STEP, WARM = 1e-3, 0.02
 """Step of the chain and the arm [s], and what is solved before the clock starts."""
@@ -73,6 +74,16 @@ def links(sizes: Sequence[int], steps: int, repeats: int) -> list[Row]:
         compiled = time.process_time() - begin
         us, simulation = stepped(model, steps, repeats)
         add(rows, "links", n, us, us / n, per_step(simulation), f"{compiled:10.2f}")
+    return conclude(rows, 8, 2)
+
+
+def elements(sizes: Sequence[int], steps: int, repeats: int) -> list[Row]:
+    """The beam."""
+    heading("elements", "us/step", "us/element", "slope", "iterations", "factorisations")
+    rows: list[Row] = []
+    for n in sizes:
+        us, simulation = stepped(Model(beam(n)), steps, repeats)
+        add(rows, "elements", n, us, us / n, per_step(simulation))
     return conclude(rows, 8, 2)
 
 
@@ -172,10 +183,11 @@ def main(arguments: list[str] | None = None) -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--links", type=int, nargs="*", default=[1, 2, 4, 8, 16, 32, 64, 128, 256])
+    parser.add_argument("--elements", type=int, nargs="*", default=[4, 8, 16, 32, 64], help="of a beam")
     parser.add_argument("--worlds", type=int, nargs="*", default=[1, 4, 16, 64, 256])
     parser.add_argument("--muscles", type=int, nargs="*", default=[6, 12, 24, 48, 96, 192], help="multiples of 6")
     parser.add_argument("--threads", type=int, nargs="*", default=[1, 2], help="of the worlds")
-    parser.add_argument("--steps", type=int, default=200, help="of a timing of chain or arm")
+    parser.add_argument("--steps", type=int, default=200, help="of a timing of chain, beam or arm")
     parser.add_argument("--rows", type=int, default=300, help="control periods of an episode; 300 is a whole one")
     parser.add_argument("--repeats", type=int, default=3, help="of each timing; the median counts")
     parser.add_argument("--out", type=Path, help="a CSV of the tables")
@@ -185,6 +197,7 @@ def main(arguments: list[str] | None = None) -> None:
     if any(n < 1 or (FLAT % n if n < FLAT else n % FLAT) for n in given.worlds):
         parser.error(f"--worlds: divisors or multiples of {FLAT} are wanted")
     rows = links(given.links, given.steps, given.repeats) if given.links else []
+    rows += elements(given.elements, given.steps, given.repeats) if given.elements else []
     rows += muscles(given.muscles, given.steps, given.repeats) if given.muscles else []
     for threads in given.threads if given.worlds else []:
         rows += worlds(given.worlds, given.rows, max(1, given.repeats - 2), threads)

@@ -6,11 +6,26 @@ import math
 
 import numpy as np
 
-from dms_core import Model, Simulation, System
-from dms_core.model import Constant, Gravity, Revolute, RigidBody
+from dms_core import Model, Simulation
+from dms_core.model import (
+    Beam,
+    BeamSection,
+    Constant,
+    Gravity,
+    Input,
+    JointMotor,
+    LineGuide,
+    PointMass,
+    Revolute,
+    RigidBody,
+    Spherical,
+    System,
+)
+from dms_core.model.geometry.frames import quaternion
 from exo_env.ecosystem.arm import Arm
 from exo_env.ecosystem.bare_arm import bare_arm
 from exo_env.paper.scenarios import build, load_scenarios
+from tests.benchmarks import flexible_reference as flexible
 from tests.benchmarks.chain_reference import TIP
 
 ARM_TASKS = {
@@ -47,6 +62,56 @@ def chain_gap(simulation: Simulation) -> float:
     """Largest |phi| now [m or -]."""
     state = simulation.state
     return float(np.abs(simulation.model.constraint_jacobian(state.q, state.v, simulation.time)[0]).max())
+
+
+def section(of: flexible.RoundSection) -> BeamSection:
+    """A round section as ours."""
+    return BeamSection(
+        youngs_modulus=of.E, shear_modulus=of.G, area=of.area, inertia_y=of.inertia, inertia_z=of.inertia,
+        torsion_constant=2.0 * of.inertia, shear_factor_y=of.shear_factor, shear_factor_z=of.shear_factor,
+        density=of.density,
+    )  # fmt: skip
+
+
+def beam(elements: int) -> System:
+    """The beam of flexible_reference.py."""
+    boom = Beam(name="boom", section=section(flexible.RUBBER), length=flexible.BEAM_LENGTH, elements=elements)
+    return System(
+        "beam", compositions=[boom], constraints=[Revolute(name="hinge", body_j=boom.node(0))],
+        forces=[Gravity(name="g", acceleration=(0, -flexible.GRAVITY, 0))],
+    )  # fmt: skip
+
+
+def slider_crank(elements: int) -> System:
+    """The slider-crank of flexible_reference.py; the rod has an even number of elements."""
+    pin, angle = flexible.rod_start()
+    rod = Beam(
+        name="rod", section=section(flexible.STEEL), length=flexible.ROD, elements=elements, position=(*pin, 0.0),
+        orientation=tuple(quaternion((0.0, 0.0, 1.0), angle)),
+    )  # fmt: skip
+    J = flexible.CRANK_INERTIA
+    crank = RigidBody(
+        name="crank", mass=0.1, inertia=(J, J, J), orientation=tuple(quaternion((0.0, 0.0, 1.0), flexible.START))
+    )
+    far = pin[0] + flexible.ROD * math.cos(angle)
+    slider = PointMass(name="slider", mass=flexible.SLIDER_MASS, position=(far, 0.0, 0.0))
+    joints = [
+        Revolute(name="bearing", body_j="crank"),
+        Revolute(name="pin", body_i="crank", body_j=rod.node(0), point_i=(flexible.CRANK, 0.0, 0.0)),
+        Spherical(name="wrist", body_i=rod.node(-1), body_j="slider"),
+        LineGuide(name="guide", body_j="slider", axis_i=(1.0, 0.0, 0.0)),
+    ]
+    return System(
+        "slider-crank", compositions=[rod], bodies=[crank, slider], constraints=joints,
+        forces=[JointMotor(name="motor", joint="bearing", input="moment")],
+        inputs=[Input(name="moment", signal=Constant(value=flexible.MOMENT))],
+    )  # fmt: skip
+
+
+def node_error(simulation: Simulation, node: str, where: tuple[float, float]) -> float:
+    """Distance of a node from a place of the plane [m]."""
+    o = simulation.model.layout.offset[node]
+    return float(np.hypot(*(simulation.state.q[o : o + 2] - where)))
 
 
 def arm(task: str) -> Model:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from dms_core.model.contact import CylinderContact, SphereContact, SphereCylinderContact, SpherePairContact
+from dms_core.model.contact import (
+    CylinderContact,
+    CylinderPairContact,
+    SphereContact,
+    SphereCylinderContact,
+    SpherePairContact,
+)
 from dms_core.model.element import Force
 from dms_core.model.sensors import ContactSensor
 from tests.example_elements import Example
@@ -28,6 +34,14 @@ ON_A_CYLINDER = SphereCylinderContact(
 """On its side. The spheres' centres of the next two are above an end of a wide disc, and beside a rod's rim."""
 ON_AN_END = ON_A_CYLINDER.model_copy(update={"radius_i": 30.0, "length_i": 0.02, "radius_j": 4.0})
 ON_A_RIM = ON_A_CYLINDER.model_copy(update={"radius_i": 0.02, "length_i": 0.02, "radius_j": 6.0})
+
+CROSSED = CylinderPairContact(
+    name="touch", centre_i=(0.4, -0.1, 0.2), axis_i=(0.3, 0.2, 1.0), radius_i=3.0, length_i=40.0,
+    centre_j=(-0.2, 0.5, 0.1), axis_j=(1.0, 0.3, 0.2), radius_j=2.0, length_j=30.0, **BODIES, **LAW,
+)  # fmt: skip
+"""The next two touch with an end of the second one, and with ends of both."""
+WITH_AN_END = CROSSED.model_copy(update={"length_j": 0.02})
+WITH_BOTH_ENDS = WITH_AN_END.model_copy(update={"length_i": 0.02})
 
 
 def _touch(element: Force, *inputs: str) -> Example:
@@ -79,6 +93,26 @@ def on_a_cylinder_at_a_speed() -> Example:
     return _touch(ON_A_CYLINDER.model_copy(update={"impact_speed_input": "speed"}), "speed")
 
 
+def crossed() -> Example:
+    """The sides of two cylinders."""
+    return _touch(CROSSED)
+
+
+def with_an_end() -> Example:
+    """An end on a side."""
+    return _touch(WITH_AN_END)
+
+
+def with_both_ends() -> Example:
+    """Two ends."""
+    return _touch(WITH_BOTH_ENDS)
+
+
+def crossed_at_a_speed() -> Example:
+    """At an impact speed from an input."""
+    return _touch(CROSSED.model_copy(update={"impact_speed_input": "speed"}), "speed")
+
+
 def cylinder_at_a_speed() -> Example:
     """At an impact speed from an input."""
     return _touch(CYLINDER.model_copy(update={"impact_speed_input": "speed"}), "speed")
@@ -99,6 +133,11 @@ def sensed_on_a_rim() -> Example:
     return _sensed(ON_A_RIM)
 
 
+def sensed_pair() -> Example:
+    """Sensor of two cylinders."""
+    return _sensed(CROSSED)
+
+
 def sensed_cylinder() -> Example:
     """Sensor of one end."""
     return _sensed(CYLINDER)
@@ -113,6 +152,7 @@ EXAMPLES = {
     "sphere_contact": (sphere, sphere_on_ground),
     "sphere_pair_contact": (spheres, spheres_at_a_speed),
     "sphere_cylinder_contact": (on_a_cylinder, on_an_end, on_a_rim, on_a_cylinder_at_a_speed),
+    "cylinder_pair_contact": (crossed, with_an_end, with_both_ends, crossed_at_a_speed),
     "cylinder_contact": (cylinder, cylinder_at_a_speed),
-    "contact_sensor": (sensed_sphere, sensed_on_a_rim, sensed_cylinder, sensed_input),
+    "contact_sensor": (sensed_sphere, sensed_on_a_rim, sensed_pair, sensed_cylinder, sensed_input),
 }

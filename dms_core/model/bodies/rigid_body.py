@@ -59,6 +59,18 @@ def _gt_times(p, w):
 
 
 @compiled
+def _g_columns(p):
+    """The four columns of G(p)."""
+    return (-p[1], -p[2], -p[3]), (p[0], -p[3], p[2]), (p[3], p[0], -p[1]), (-p[2], p[1], p[0])
+
+
+@compiled
+def _gt_by_p(w):
+    """Derivatives of G(p)^T w by the four components of p."""
+    return (0.0, w[0], w[1], w[2]), (-w[0], 0.0, -w[2], w[1]), (-w[1], w[2], 0.0, -w[0]), (-w[2], -w[1], w[0], 0.0)
+
+
+@compiled
 def _inertia_times(par, w):
     """J w."""
     return (
@@ -82,17 +94,16 @@ def rigid_body(ip, par, q, v, a, u, level, r, Jq, Jv, Ja):
     if level > 0:
         for i in range(3):
             Ja[i, i] += m
+        # G is linear: G(e) is its derivative by component k, and G(e) x = -G(x) e.
+        gp, gpd, gpdd, ea, ev = _g_columns(p), _g_columns(pd), _g_columns(pdd), _gt_by_p(ga), _gt_by_p(gv)
         for k in range(4):
-            e = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2), 1.0 * (k == 3))
-            # G is linear: G(e) is its derivative by component k, and G(e) x = -G(x) e.
-            mass = _gt_times(p, _inertia_times(par, _g_times(p, e)))
-            dq1, dq2 = _gt_times(e, ga), _gt_times(p, _inertia_times(par, _g_times(e, pdd)))
-            dq3 = _gt_times(pd, _inertia_times(par, _g_times(e, pd)))
-            dv1, dv2 = _gt_times(e, gv), _gt_times(pd, _inertia_times(par, _g_times(p, e)))
+            turned = _inertia_times(par, gp[k])
+            mass, dv2 = _gt_times(p, turned), _gt_times(pd, turned)
+            dq2, dq3 = _gt_times(p, _inertia_times(par, gpdd[k])), _gt_times(pd, _inertia_times(par, gpd[k]))
             for i in range(4):
                 Ja[3 + i, 3 + k] += 4.0 * mass[i]
-                Jq[3 + i, 3 + k] += 4.0 * (dq1[i] + dq2[i]) + 8.0 * dq3[i]
-                Jv[3 + i, 3 + k] += 8.0 * (dv1[i] + dv2[i])
+                Jq[3 + i, 3 + k] += 4.0 * (ea[k][i] - dq2[i]) - 8.0 * dq3[i]
+                Jv[3 + i, 3 + k] += 8.0 * (ev[k][i] + dv2[i])
 
 
 @compiled(makes_arrays=True)

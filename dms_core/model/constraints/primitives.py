@@ -13,7 +13,6 @@ import numpy as np
 from dms_core.compiled.jit import compiled
 from dms_core.model.element import ConstraintPattern
 from dms_core.model.geometry.rotations import (
-    AXES,
     add_cross_hessian,
     add_gradient,
     add_hessian,
@@ -44,9 +43,12 @@ def coincidence(k, oi, oj, si, sj, q, v, lam, level, phi, G, W, H):
         w = (lam[k], lam[k + 1], lam[k + 2])
         add_hessian(H, oi, w, si, 1.0)
         add_hessian(H, oj, w, sj, -1.0)
+        # A s is a quadratic form of p: its gradient at pdot is (d(A s)/dp pdot)_p.
+        ci, cj = columns(v, oi, si), columns(v, oj, sj)
         for m in range(3):
-            add_row_hessian(W, k + m, oi, v, AXES[m], si, 1.0)
-            add_row_hessian(W, k + m, oj, v, AXES[m], sj, -1.0)
+            for n in range(4):
+                W[k + m, oi + 3 + n] += ci[n][m]
+                W[k + m, oj + 3 + n] -= cj[n][m]
 
 
 @compiled

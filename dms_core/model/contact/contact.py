@@ -38,12 +38,13 @@ class Contact(Force):
         """The impact's speed, where it is an input."""
         return () if self.impact_speed_input is None else (self.impact_speed_input,)
 
-    def placed(self, shape: int, *, half_length: float = 0.0, **geometry) -> Placement:
+    def placed(self, shape: int, *, half_length: float = 0.0, half_length_j: float = 0.0, **geometry) -> Placement:
         """The kernel call of a shape.
 
         Args:
             shape: first integer, see shapes.py.
             half_length: of a cylinder of body i [m].
+            half_length_j: of a second cylinder, of body j [m].
             geometry: s_i, direction, radius_i, s_j, axis, radius, see ContactNumbers.
         """
         d = damping_number(self.restitution)
@@ -61,6 +62,7 @@ class Contact(Force):
                 friction=self.friction,
                 slip_speed=self.slip_speed,
                 half_length=half_length,
+                half_length_j=half_length_j,
             ),
             pattern=Pattern(full, full, none),
         )

@@ -1,12 +1,13 @@
 """Where two shapes touch: gap, normal and point of contact, and how they change with the coordinates.
 
-The first body carries a half-space, a sphere or a solid cylinder, the second one a sphere or a disc (one end of a
-cylinder):
+The first body carries a half-space, a sphere or a solid cylinder, the second one a sphere, a disc (one end of a
+cylinder) or the side of a cylinder:
 
     plane, sphere    n = A_i m,        g = n . (c - P) - R,     X = c - (n . (c - P)) n
     sphere, sphere   n = d / |d|,      g = |d| - R_i - R_j,     X = c_j - (R_j + g / 2) n,      d = c_j - c_i
     plane, disc      Y = c - R t / sqrt(|t|^2 + e^2),   t = n - (n . f) f,   g = n . (Y - P),   X = Y - g n
     cylinder, sphere n = w_r t / |t| + w_a f,   g = D - R,   X = c - (R + g / 2) n,   d = c - P,   t = d - (d . f) f
+    sides            as two spheres, about the nearest points of both axes (axis_pair.py)
 
 with the centre c, the disc's axis f = A_j b and its deepest point Y. A disc that lies flat in the plane has no deepest
 point: e = 1e-6 lets Y pass to its centre there. A point is a sphere without radius. Of a cylinder, P is the middle,
@@ -21,6 +22,7 @@ import math
 from typing import NamedTuple
 
 from dms_core.compiled.jit import compiled
+from dms_core.model.contact.axis_pair import nearest, nearest_change
 from dms_core.model.contact.solid_cylinder import distance, distance_change
 from dms_core.model.geometry.rotations import (
     across,
@@ -36,7 +38,7 @@ from dms_core.model.geometry.rotations import (
     vec,
 )
 
-PLANE_SPHERE, SPHERES, PLANE_DISC, CYLINDER_SPHERE = 0, 1, 2, 3
+PLANE_SPHERE, SPHERES, PLANE_DISC, CYLINDER_SPHERE, CYLINDERS = 0, 1, 2, 3, 4
 """First integer of a contact's table."""
 FLAT = 1e-6
 """Sine of the angle between a disc and the plane from which on its deepest point passes to its centre [-]."""
@@ -65,6 +67,8 @@ class ContactNumbers(NamedTuple):
     slip_speed: int = 17
     half_length: int = 18
     """Of the cylinder of body i [m]."""
+    half_length_j: int = 19
+    """Of the cylinder of body j [m]."""
 
 
 CONTACT = ContactNumbers()
@@ -75,7 +79,9 @@ def touching(shape, par, q):
     """(g, n, X)."""
     s_i, c = vec(par, CONTACT.s_i), point(q, BODY_J, vec(par, CONTACT.s_j))
     P, R = point(q, BODY_I, s_i), par[CONTACT.radius]
-    if shape == SPHERES:
+    if shape == CYLINDERS:
+        P, c = _nearest_points(par, q, P, c)
+    if shape in (SPHERES, CYLINDERS):
         d = sub(c, P)
         length = max(math.sqrt(dot(d, d)), SHORTEST)
         n, g = scale(1.0 / length, d), length - par[CONTACT.radius_i] - R
@@ -127,7 +133,9 @@ def touch_change(shape, par, q, k):
     s_i, s_j, R = vec(par, CONTACT.s_i), vec(par, CONTACT.s_j), par[CONTACT.radius]
     P, c = point(q, BODY_I, s_i), point(q, BODY_J, s_j)
     dP, dc = add(dr_i, turned_by(q, BODY_I, dp_i, s_i)), add(dr_j, turned_by(q, BODY_J, dp_j, s_j))
-    if shape == SPHERES:
+    if shape == CYLINDERS:
+        P, c, dP, dc = _nearest_points_change(par, q, P, c, dP, dc, dp_i, dp_j)
+    if shape in (SPHERES, CYLINDERS):
         d, dd = sub(c, P), sub(dc, dP)
         length = max(math.sqrt(dot(d, d)), SHORTEST)
         n = scale(1.0 / length, d)
@@ -151,6 +159,36 @@ def touch_change(shape, par, q, k):
         return dg, dn, sub(dY, add(scale(dg, n), scale(g, dn)))
     h, dh = dot(n, sub(c, P)), dot(dn, sub(c, P)) + dot(n, sub(dc, dP))
     return dh, dn, sub(dc, add(scale(dh, n), scale(h, dn)))
+
+
+@compiled
+def _nearest_points(par, q, P, c):
+    """Points of the axes of two cylinders with the middles P and c."""
+    f_i = rotated(q, BODY_I, vec(par, CONTACT.direction))
+    f_j = rotated(q, BODY_J, vec(par, CONTACT.axis))
+    s, t, _, _ = nearest(sub(c, P), f_i, f_j, par[CONTACT.half_length], par[CONTACT.half_length_j])
+    return add(P, scale(s, f_i)), add(c, scale(t, f_j))
+
+
+@compiled
+def _nearest_points_change(par, q, P, c, dP, dc, dp_i, dp_j):
+    """These points, and their changes for those of the middles and of both bodies' Euler parameters."""
+    b_i, b_j = vec(par, CONTACT.direction), vec(par, CONTACT.axis)
+    h_i, h_j = par[CONTACT.half_length], par[CONTACT.half_length_j]
+    f_i, df_i = rotated(q, BODY_I, b_i), turned_by(q, BODY_I, dp_i, b_i)
+    f_j, df_j = rotated(q, BODY_J, b_j), turned_by(q, BODY_J, dp_j, b_j)
+    d, dd = sub(c, P), sub(dc, dP)
+    s, t, s_is_free, t_is_free = nearest(d, f_i, f_j, h_i, h_j)
+    ds, dt = nearest_change(
+        s, t, s_is_free, t_is_free, h_i, h_j, dot(f_i, f_j), dot(df_i, d) + dot(f_i, dd), dot(df_j, d) + dot(f_j, dd),
+        dot(df_i, f_j) + dot(f_i, df_j),
+    )  # fmt: skip
+    return (
+        add(P, scale(s, f_i)),
+        add(c, scale(t, f_j)),
+        add(dP, add(scale(ds, f_i), scale(s, df_i))),
+        add(dc, add(scale(dt, f_j), scale(t, df_j))),
+    )
 
 
 @compiled

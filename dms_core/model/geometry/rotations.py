@@ -164,14 +164,11 @@ def add_hessian(H, o, w, s, factor):
 
 @compiled
 def columns(q, o, s):
-    """The four columns of d(A s)/dp (3 x 4) for the body at offset o."""
+    """The four columns of d(A s)/dp (3 x 4) for the body at offset o: 2 [d, (e.s) I + [d]x] with d = p0 s + e x s."""
     p = euler_parameters(q, o)
-    return (
-        scale(2.0, bilinear(p, (1.0, 0.0, 0.0, 0.0), s)),
-        scale(2.0, bilinear(p, (0.0, 1.0, 0.0, 0.0), s)),
-        scale(2.0, bilinear(p, (0.0, 0.0, 1.0, 0.0), s)),
-        scale(2.0, bilinear(p, (0.0, 0.0, 0.0, 1.0), s)),
-    )
+    e = (p[1], p[2], p[3])
+    d, c = scale(2.0, add(scale(p[0], s), cross(e, s))), 2.0 * dot(e, s)
+    return d, (c, -d[2], d[1]), (d[2], c, -d[0]), (-d[1], d[0], c)
 
 
 @compiled

@@ -53,7 +53,7 @@ def _parts(x: np.ndarray, ptr: np.ndarray, which: Sequence[int]) -> tuple[np.nda
 def _some_calls(calls: Calls, which: Sequence[int]) -> Calls:
     """Those calls alone, their rows behind each other."""
     found = {}
-    for name in ("iq", "iu", "ip", "par"):
+    for name in ("iq", "iu", "ip", "par", "solved"):
         found[name], found[f"{name}_ptr"] = _parts(getattr(calls, name), getattr(calls, f"{name}_ptr"), which)
     row = np.concatenate([[0], np.cumsum([calls.row[e + 1] - calls.row[e] for e in which])]).astype(np.int64)
     return Calls(kernel=calls.kernel[which], row=row, moving=np.arange(len(which)), **found)

@@ -1,6 +1,6 @@
 """The two linear systems of a step, solved from the packed tables."""
 
-from dms_core.compiled.arena import fields, indices, inner, naturals, number
+from dms_core.compiled.arena import fields, indices, inner, ints, naturals, number
 from dms_core.compiled.jit import compiled
 from dms_core.linear.lu import factor, solve, solve_transposed
 from dms_core.linear.symbolic import LuTables
@@ -16,6 +16,7 @@ def lu_tables(t):
         number(t, LU.multiply_adds), indices(t, LU.position), naturals(t, LU.row_of), naturals(t, LU.col_of),
         naturals(t, LU.slot), naturals(t, LU.lane), naturals(t, LU.first), naturals(t, LU.diagonal),
         naturals(t, LU.end), naturals(t, LU.group), naturals(t, LU.below), naturals(t, LU.target),
+        number(t, LU.lower), number(t, LU.numbers), ints(t, LU.move), naturals(t, LU.place),
     )  # fmt: skip
 
 

@@ -63,9 +63,11 @@ def sdirk2_step(m, s, o, h):
     wq, wv = floats(s, STATE.wq), floats(s, STATE.wv)
     for i in range(q.shape[0]):
         # h^3 y''' of the cubic through both ends and their slopes.
-        third = 6.0 * h * (qd[i] + c0 * q1[i] + cq[i]) - 12.0 * (q1[i] - q[i])
-        error = max(error, SDIRK_ERROR * abs(third) / wq[i])
+        size = SDIRK_ERROR * abs(6.0 * h * (qd[i] + c0 * q1[i] + cq[i]) - 12.0 * (q1[i] - q[i]))
+        if size > error * wq[i]:
+            error = size / wq[i]
         if is_second[i]:
-            third = 6.0 * h * (vd[i] + c0 * v1[i] + cv[i]) - 12.0 * (v1[i] - v[i])
-            error = max(error, SDIRK_ERROR * abs(third) / wv[i])
+            size = SDIRK_ERROR * abs(6.0 * h * (vd[i] + c0 * v1[i] + cv[i]) - 12.0 * (v1[i] - v[i]))
+            if size > error * wv[i]:
+                error = size / wv[i]
     return code, first + second, error

@@ -5,6 +5,9 @@ A row says (system, program, setting, error, ms, gap_m). Systems and units of `m
     elbow              a simulated second; error of the elbow angle [rad]
     arm26 ...          a simulated second; error of the elbow angle [rad]
     chain N            a simulated second; error of the tip [m], gap_m the largest opening of a joint [m]
+    beam N             a simulated second; error of the tip of a beam of N elements [m]
+    slider-crank       a simulated second; error of the middle of its rod [m]
+    growth N           a simulated second of the beam in steps of 1 ms; error of its tip [m]
     environment        a control period, resets included; a reset, for the setting "reset"
 """
 

@@ -26,9 +26,15 @@ from tests.benchmarks.calibration import lump
 from tests.benchmarks.peer_table import SHIPPED, write_shipped
 
 HERE = Path(__file__).parent
-SCRIPTS = {"myosuite_env.py": "myo", "mujoco_chain.py": "myo", "exudyn_chain.py": "exu", "exudyn_elbow.py": "exu"}
+SCRIPTS = {
+    "myosuite_env.py": "myo", "mujoco_chain.py": "myo", "exudyn_chain.py": "exu", "exudyn_elbow.py": "exu",
+    "exudyn_flexible.py": "exu",
+}  # fmt: skip
 """And the environments that they run in."""
-QUICK = {"myosuite_env.py": ["--steps", "300"], "exudyn_elbow.py": ["--steps", "0.002", "0.001"]}
+QUICK = {
+    "myosuite_env.py": ["--steps", "300"], "exudyn_elbow.py": ["--steps", "0.002", "0.001"],
+    "exudyn_flexible.py": ["--elements", "8"],
+}  # fmt: skip
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 

@@ -13,6 +13,7 @@ from dms_core.model import (
     ContactSensor,
     CoordinateSensor,
     CylinderContact,
+    CylinderPairContact,
     DcMotor,
     DelayedError,
     ElasticRope,
@@ -95,6 +96,10 @@ def everything() -> System:
             SphereCylinderContact(
                 name="bar", body_i="arm", body_j="ball", axis_i=(0.3, 0.2, 1.0), radius_i=0.3, length_i=0.9,
                 radius_j=0.3, stiffness=60.0, friction=0.2, slip_speed=0.1,
+            ),
+            CylinderPairContact(
+                name="bars", body_i="arm", body_j="ball", axis_i=(0.3, 0.2, 1.0), radius_i=0.3, length_i=0.9,
+                axis_j=(1.0, 0.1, 0.2), radius_j=0.3, length_j=0.4, stiffness=60.0, friction=0.2, slip_speed=0.1,
             ),
             ElasticRope(name="tether", path=TO_BALL, axial_stiffness=20.0, free_length=0.8, damping=0.5),
             Winch(

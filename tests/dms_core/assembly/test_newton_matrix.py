@@ -28,7 +28,7 @@ from tests.dms_core.linear.exact_norm import exact_norm
 from tests.dms_core.test_derivatives import CONCRETE, differences
 
 IN_A_SYSTEM_OF_DRIVES = {
-    "cylinder_contact", "dc_motor", "elastic_rope", "sensor_pid", "sphere_contact",
+    "cylinder_contact", "cylinder_pair_contact", "dc_motor", "elastic_rope", "sensor_pid", "sphere_contact",
     "sphere_cylinder_contact", "sphere_pair_contact", "state_space", "winch",
 }  # fmt: skip
 """Kinds whose system, and whose Newton matrix, are those of test_connections.py."""

@@ -33,6 +33,7 @@ def test_table_and_numbers(command, tmp_path):
     found = json.loads(stats.read_text())
     assert found["by"] == ["rod.mass", "hinge.point_i.0"] and found["of"] == ["swing.angle", "integral of swing.angle"]
     table = read(out)
+    assert list(table["of"]) == found["of"]
     np.testing.assert_allclose(table["hinge.point_i.0"], np.array(found["derivative"])[:, 1], rtol=1e-9)
 
 

@@ -272,7 +272,7 @@ def test_keys_are_the_same_in_every_process():
         "code_key(advance_method)[0])"
     )
     found = set()
-    for seed in ("1", "2", "3"):
+    for seed in ("1", "2"):
         env = os.environ | {"PYTHONPATH": str(configs().parent), "PYTHONHASHSEED": seed}
         done = subprocess.run([sys.executable, "-c", call], env=env, capture_output=True, text=True, check=True)
         found.add(done.stdout)

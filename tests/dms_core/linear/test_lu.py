@@ -239,3 +239,33 @@ def test_complex_matrices_in_the_same_tables(seed, transposed):
     (solve_transposed if transposed else solve)(tables, a, b.real.astype(complex), x, work)
     np.testing.assert_allclose(x.real, real, rtol=1e-9, atol=1e-12 * np.abs(real).max())
     assert np.abs(x.imag).max() <= 1e-12 * np.abs(real).max()
+
+
+@pytest.mark.parametrize("density", [0.02, 0.9])
+@pytest.mark.parametrize("kind", [float, complex])
+def test_both_ways_to_solve(density, kind):
+    """Sparse blocks are solved entry by entry, dense ones block by block; the factors behind them are the same."""
+    n = 60
+    A = random_matrix(n, density, seed=3)
+    tables, b = plan(n, A.row, A.col, A.data), np.linspace(1.0, 2.0, n).astype(kind)
+    values = A.data * (1.0 + (0.5j if kind is complex else 0.0))
+    assert (tables.move.size > 0) == (density < 0.1)
+    a, work = (np.zeros(k, kind) for k in (tables.size, tables.work_size))
+    assemble(tables, values, a)
+    factor(tables, a, work)
+    solve(tables, a, b, b, work)  # in place
+    dense = sp.coo_matrix((values, (A.row, A.col))).toarray()
+    limit = 1e3 * np.finfo(float).eps * np.linalg.cond(dense)  # as in test_random_patterns_against_lapack
+    assert np.linalg.norm(b - np.linalg.solve(dense, np.linspace(1.0, 2.0, n))) <= limit * np.linalg.norm(b)
+
+
+def test_a_move_waits_for_what_it_reads():
+    """Each move of L comes behind all that change what it reads, each of U too; each entry stands there once."""
+    A = random_matrix(80, 0.03, seed=1)
+    tables = plan(80, A.row, A.col, A.data)
+    goal, source = tables.move >> 32, tables.move & (2**32 - 1)
+    assert tables.move.size == tables.fill - tables.n == np.unique(tables.place).size
+    for half, below in ((slice(0, tables.lower), True), (slice(tables.lower, None), False)):
+        assert ((goal[half] > source[half]) == below).all()
+        last = {int(g): k for k, g in enumerate(goal[half])}
+        assert all(last.get(int(s), -1) < k for k, s in enumerate(source[half]))

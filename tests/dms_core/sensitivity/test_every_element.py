@@ -39,7 +39,10 @@ PLACES = {
     "reflex_rising", "reflex_limited", "sensor", "sensor_steep", "length_driven", "sensor_of_constraint",
 }  # fmt: skip
 """Examples that are a place for their kernel and no mechanism that runs; other examples of their kinds do."""
-APART = ("sphere_contact", "sphere_pair_contact", "sphere_cylinder_contact", "cylinder_contact", "contact_sensor")
+APART = (
+    "sphere_contact", "sphere_pair_contact", "sphere_cylinder_contact", "cylinder_pair_contact", "cylinder_contact",
+    "contact_sensor",
+)  # fmt: skip
 """Contacts, of which a run says that it is differentiated between their events only."""
 
 

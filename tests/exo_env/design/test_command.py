@@ -36,6 +36,8 @@ def test_from_end_to_end(tiny, tmp_path, capsys):
     today, found = (float(x) for x in rows[0][3:5])
     assert found < today and f"{100.0 * (found / today - 1.0):.1f}" == f"{float(rows[0][5]):.1f}"
     device, cuff = str(out / "device.yaml"), yaml.safe_load((out / "cuff.yaml").read_text())
+    for name in ("device.yaml", "cuff.yaml"):
+        assert (out / name).read_text().startswith("# Found by 'python -m exo_env design' for the least ")
     read = Exoskeleton.named(device)
     assert read.ropes["agonist"].lower[1] < -0.0725 and read.gains.kp < Exoskeleton.named("elbow").gains.kp
     env = gymnasium.make("exo_env:exo/ElbowLift-v2", exoskeleton=device, cuff=cuff)

@@ -12,7 +12,7 @@ from gymnasium import wrappers
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as vector_wrappers
 
-ID, STEPS = "exo/ElbowLift-v2", 25
+ID, STEPS = "exo/ElbowLift-v2", 18
 SHORT = {"episode_duration": 0.2}
 F = np.float32
 
