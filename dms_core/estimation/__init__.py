@@ -4,8 +4,8 @@ A model and noisy readings of some of its sensors give its state, inputs and con
 other sensors ("virtual sensing"), and how far each can be trusted.
 """
 
-from dms_core.estimation.filter.compiled_filter import CompiledFilter
-from dms_core.estimation.filter.filter_batch import FilterBatch
+from dms_core.estimation.compiled.batch import FilterBatch
+from dms_core.estimation.compiled.filter import CompiledFilter
 from dms_core.estimation.filter.forms import filter_of
 from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.estimation.measurement import Measurements, read_measurements

@@ -6,12 +6,12 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.errors import SimulationError
+from dms_core.estimation.compiled.arrays import CODE
+from dms_core.estimation.compiled.numbers import straight_directions
+from dms_core.estimation.compiled.packed import PackedFilter, cannot_be_compiled
 from dms_core.estimation.estimated import Belief
-from dms_core.estimation.filter.filter_arrays import CODE
-from dms_core.estimation.filter.filter_numbers import straight_directions
 from dms_core.estimation.filter.gaussian import is_usable
 from dms_core.estimation.filter.kalman import Correction, KalmanFilter, Predicted
-from dms_core.estimation.filter.packed_filter import PackedFilter, cannot_be_compiled
 from dms_core.estimation.filter.unscented import UnscentedFilter
 from dms_core.estimation.settings import FilterSettings
 

@@ -9,7 +9,7 @@ from scipy.special import erfcx
 from dms_core import Model
 from dms_core.errors import InputError, SimulationError
 from dms_core.estimation import Bias, Channel, EstimatedInput, FilterBatch, FilterSettings, KalmanFilter
-from dms_core.estimation.filter.compiled_filter import CompiledFilter
+from dms_core.estimation.compiled.filter import CompiledFilter
 from dms_core.estimation.filter.cut import cut_moments
 from dms_core.estimation.filter.forms import CompiledKalmanFilter, filter_of
 from dms_core.estimation.filter.unscented import UnscentedFilter

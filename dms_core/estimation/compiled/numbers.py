@@ -17,7 +17,7 @@ from dms_core.assembly.readings.sensing import SENSING
 from dms_core.assembly.tables import CALLS, MODEL, SIGNALS
 from dms_core.compiled.arena import floats, inner, ints, matrix, table_at
 from dms_core.compiled.jit import compiled
-from dms_core.estimation.filter.filter_arrays import FILTER, TABLES
+from dms_core.estimation.compiled.arrays import FILTER, TABLES
 from dms_core.sensitivity.tangents.reading_tables import READING, READINGS, Reading
 from dms_core.sensitivity.tangents.tables import DIFFERENTIALS, MOVEMENT, Movement
 from dms_core.simulation.state import STATE

@@ -2,9 +2,9 @@
 
 from dms_core.compiled.arena import floats, inner, ints, matrix
 from dms_core.compiled.jit import compiled
-from dms_core.estimation.filter.filter_arrays import CODE, FILTER, TABLES
-from dms_core.estimation.filter.filter_numbers import put_rest
-from dms_core.estimation.filter.filter_reading import chart_size
+from dms_core.estimation.compiled.arrays import CODE, FILTER, TABLES
+from dms_core.estimation.compiled.numbers import put_rest
+from dms_core.estimation.compiled.reading import chart_size
 from dms_core.estimation.filter.nominal_world import FINER
 from dms_core.sensitivity.tangents.chart import CHART, factor_square, lift, pick, solve_factored
 from dms_core.sensitivity.tangents.steps import carry_forward, differentiated_step

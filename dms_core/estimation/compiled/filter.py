@@ -12,11 +12,11 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.errors import SimulationError
+from dms_core.estimation.compiled.arrays import CODE, FilterArrays
+from dms_core.estimation.compiled.packed import PackedFilter
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.charts import chart_with
-from dms_core.estimation.filter.filter_arrays import CODE, FilterArrays
 from dms_core.estimation.filter.kalman import KalmanFilter
-from dms_core.estimation.filter.packed_filter import PackedFilter
 from dms_core.estimation.settings import FilterSettings
 
 WHY = {

@@ -2,9 +2,9 @@
 
 from dms_core.compiled.arena import floats, inner, table_at
 from dms_core.compiled.jit import compiled
-from dms_core.estimation.filter.filter_arrays import CODE, FILTER, TABLES
-from dms_core.estimation.filter.filter_correction import correct
-from dms_core.estimation.filter.filter_prediction import predict
+from dms_core.estimation.compiled.arrays import CODE, FILTER, TABLES
+from dms_core.estimation.compiled.correction import correct
+from dms_core.estimation.compiled.prediction import predict
 
 FIELDS = len(TABLES)
 

@@ -8,10 +8,10 @@ import math
 from dms_core.assembly.tables import WORK
 from dms_core.compiled.arena import floats, inner, ints, matrix
 from dms_core.compiled.jit import compiled
+from dms_core.estimation.compiled.arrays import CODE, FILTER, TABLES
+from dms_core.estimation.compiled.numbers import put_rest
+from dms_core.estimation.compiled.reading import chart_size, expect, nearest_turn
 from dms_core.estimation.filter.cut import cut_moments
-from dms_core.estimation.filter.filter_arrays import CODE, FILTER, TABLES
-from dms_core.estimation.filter.filter_numbers import put_rest
-from dms_core.estimation.filter.filter_reading import chart_size, expect, nearest_turn
 from dms_core.sensitivity.tangents.chart import CHART, lift, solve_square
 from dms_core.sensitivity.tangents.tables import COLUMNS
 from dms_core.simulation.iteration.parts import PARTS, run_part

@@ -8,14 +8,14 @@ from dms_core.assembly.derivatives.parameter_derivatives import Direction, decla
 from dms_core.assembly.tables import MODEL
 from dms_core.compiled.arena import Packed, number
 from dms_core.errors import InputError
+from dms_core.estimation.compiled.arrays import FilterArrays, FilterTables
+from dms_core.estimation.compiled.correction import correct
+from dms_core.estimation.compiled.numbers import put_rest, straight_directions
+from dms_core.estimation.compiled.prediction import predict
+from dms_core.estimation.compiled.reading import expect
+from dms_core.estimation.compiled.step import filter_step
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.charts import Chart, chart_at
-from dms_core.estimation.filter.filter_arrays import FilterArrays, FilterTables
-from dms_core.estimation.filter.filter_correction import correct
-from dms_core.estimation.filter.filter_numbers import put_rest, straight_directions
-from dms_core.estimation.filter.filter_prediction import predict
-from dms_core.estimation.filter.filter_reading import expect
-from dms_core.estimation.filter.filter_step import filter_step
 from dms_core.estimation.filter.kalman import KalmanFilter
 from dms_core.sensitivity.tangents.chart import packed_chart
 from dms_core.sensitivity.tangents.reading_tables import SomeReadings, calls_of, reads_welds

@@ -8,7 +8,7 @@ import math
 
 from dms_core.compiled.arena import floats, inner, ints, matrix
 from dms_core.compiled.jit import compiled
-from dms_core.estimation.filter.filter_arrays import CODE, FILTER, TABLES
+from dms_core.estimation.compiled.arrays import CODE, FILTER, TABLES
 from dms_core.sensitivity.tangents.chart import CHART, lift
 from dms_core.sensitivity.tangents.reading_tables import READINGS
 from dms_core.sensitivity.tangents.readings import pull_back

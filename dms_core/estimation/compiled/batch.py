@@ -11,9 +11,9 @@ import numpy as np
 
 from dms_core.assembly.model import Model
 from dms_core.errors import InputError, SimulationError
-from dms_core.estimation.filter.compiled_filter import CompiledFilter
-from dms_core.estimation.filter.filter_arrays import CODE
-from dms_core.estimation.filter.filter_step import step_some
+from dms_core.estimation.compiled.arrays import CODE
+from dms_core.estimation.compiled.filter import CompiledFilter
+from dms_core.estimation.compiled.step import step_some
 from dms_core.estimation.settings import FilterSettings
 
 
