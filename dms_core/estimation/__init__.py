@@ -4,9 +4,10 @@ A model and noisy readings of some of its sensors give its state, inputs and con
 other sensors ("virtual sensing"), and how far each can be trusted.
 """
 
-from dms_core.estimation.filter.compiled_filter import CompiledFilter
+from dms_core.estimation.compiled.batch import FilterBatch
+from dms_core.estimation.compiled.filter import CompiledFilter
+from dms_core.estimation.filter.forms import filter_of
 from dms_core.estimation.filter.kalman import KalmanFilter
-from dms_core.estimation.filter.unscented import filter_of
 from dms_core.estimation.measurement import Measurements, read_measurements
 from dms_core.estimation.observability import empirical_observability, local_observability
 from dms_core.estimation.record import estimate
@@ -18,6 +19,7 @@ __all__ = [
     "CompiledFilter",
     "EstimatedConstant",
     "EstimatedInput",
+    "FilterBatch",
     "FilterSettings",
     "KalmanFilter",
     "Measurements",

@@ -187,7 +187,7 @@ class Estimated:
         """Covariance that joins over a time [s], at its end, shape (n, n); inputs and constants are held on the way."""
         s, names = self.settings, self.names(chart)
         Q = np.zeros((len(names), len(names)))
-        intensity = self._by_coordinate(s.noise.acceleration, s.noise.rate, s.noise.coordinates, "")
+        intensity = self.intensities
         n = len(chart.chosen)
         W = self._along(chart, intensity)
         Q[:n, :n], Q[:n, n : 2 * n] = W * dt**3 / 3.0, W * dt**2 / 2.0
@@ -199,6 +199,12 @@ class Estimated:
         joined = [x.over(dt)[1] for x in s.inputs.values()]
         Q[at, at] = [*joined, *(x**2 * dt for x in (*(c.walk for c in s.constants.values()), *walks))]
         return Q
+
+    @property
+    def intensities(self) -> np.ndarray:
+        """Noise that drives each coordinate, per square root of a second, shape (n_q,)."""
+        noise = self.settings.noise
+        return self._by_coordinate(noise.acceleration, noise.rate, noise.coordinates, "")
 
     def factors(self, dt: float) -> np.ndarray:
         """Factors of what is estimated beside the state over a time [s], about `start`."""

@@ -224,7 +224,7 @@ class Arm:
 
     def muscle_geometry(self, muscle: str, flexion: float) -> tuple[float, float]:
         """(length [m], moment arm -dl/dtheta [m], positive for a flexor) at an elbow angle [rad]."""
-        return _path_geometry(self, self.path(muscle, welded=True), flexion)
+        return path_geometry(self, self.path(muscle, welded=True), flexion)
 
     def muscle(self, name: str, **more: Any) -> ThelenMuscle:
         """A muscle of the person; `more` are further fields of ThelenMuscle, or others in place of these."""
@@ -284,7 +284,7 @@ def excitation_name(muscle: str) -> str:
     return f"excitation.{muscle}"
 
 
-def _path_geometry(arm: Arm, points: tuple[PathPoint, ...], flexion: float) -> tuple[float, float]:
+def path_geometry(arm: Arm, points: tuple[PathPoint, ...], flexion: float) -> tuple[float, float]:
     """Length and moment arm of a path through ground and forearm points."""
     A, length, moment_arm = arm.rotation(flexion), 0.0, 0.0
     x = [arm.elbow + A @ np.array(p.point) if p.body == "forearm" else np.array(p.point) for p in points]

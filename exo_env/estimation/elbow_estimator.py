@@ -15,9 +15,9 @@ import numpy as np
 from dms_core import Model
 from dms_core.errors import SimulationError
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings
+from dms_core.estimation.compiled.filter import CompiledFilter
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.charts import chart_at
-from dms_core.estimation.filter.compiled_filter import CompiledFilter
 from dms_core.estimation.settings import InitialDeviations
 from exo_env.ecosystem.sensors import FOREARM_IMU
 from exo_env.estimation.nominal_elbow import CUFF, GRIP, NET, NominalElbow

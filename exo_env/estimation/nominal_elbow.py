@@ -57,7 +57,7 @@ class NominalElbow(Settings):
         return System(
             "nominal elbow",
             bodies=[b for b in (*arm.bodies(angle), *worn.bodies(angle)) if b.name in ("forearm", LOWER)],
-            constraints=self._joints(arm, worn),
+            constraints=joints_on_the_ground(self.device, arm, worn),
             forces=[
                 LumpedLoad(name="net_moment", body="forearm", moment=tuple(elbow), input=NET),
                 LumpedLoad(name="grip_on_arm", body="forearm", moment=tuple(-elbow), input=GRIP),
@@ -71,15 +71,16 @@ class NominalElbow(Settings):
             inputs=[Input(name=name, signal=Constant(value=0.0)) for name in (NET, GRIP)],
         )
 
-    def _joints(self, arm: Arm, worn: WornExoskeleton) -> list[Constraint]:
-        """Elbow and hinge on the ground, guide between them."""
-        axis, at = tuple(arm.axis), (0.0, -self.device.guide_distance, 0.0)
-        hinge_axis = tuple(worn.frame[:, 2])
-        return [
-            Revolute(name=ELBOW, body_j="forearm", point_i=tuple(arm.elbow), point_j=(0.0, 0.0, 0.0), axis_i=axis,
-                     axis_j=axis),
-            Revolute(name=HINGE, body_j=LOWER, point_i=tuple(worn.origin), point_j=(0.0, 0.0, 0.0), axis_i=hinge_axis,
-                     axis_j=(0.0, 0.0, 1.0)),
-            PlaneGuide(name=GUIDE, body_i=LOWER, body_j="forearm", normal_i=(1.0, 0.0, 0.0), point_i=at,
-                       point_j=tuple(worn.guided_point)),
-        ]  # fmt: skip
+
+def joints_on_the_ground(device: Exoskeleton, arm: Arm, worn: WornExoskeleton) -> list[Constraint]:
+    """Elbow and hinge on the ground, guide between them."""
+    axis, at = tuple(arm.axis), (0.0, -device.guide_distance, 0.0)
+    hinge_axis = tuple(worn.frame[:, 2])
+    return [
+        Revolute(name=ELBOW, body_j="forearm", point_i=tuple(arm.elbow), point_j=(0.0, 0.0, 0.0), axis_i=axis,
+                 axis_j=axis),
+        Revolute(name=HINGE, body_j=LOWER, point_i=tuple(worn.origin), point_j=(0.0, 0.0, 0.0), axis_i=hinge_axis,
+                 axis_j=(0.0, 0.0, 1.0)),
+        PlaneGuide(name=GUIDE, body_i=LOWER, body_j="forearm", normal_i=(1.0, 0.0, 0.0), point_i=at,
+                   point_j=tuple(worn.guided_point)),
+    ]  # fmt: skip

@@ -32,6 +32,8 @@ USUAL_LOAD = 1.25
 """Load that stands for an unknown one [kg]: the mean of what an environment draws, 0.5 to 2 kg."""
 NEAR = 0.02
 """Distance from a stop at which the elbow may rest on it [rad]."""
+USUAL_PERIOD = 0.02
+"""Period up to which a reading tells what the moment does within it [s]."""
 SMALLEST_NOISE = 1e-6
 """Least standard deviation that the filter believes of a sensor, as a part of a unit of it."""
 
@@ -53,6 +55,11 @@ class ReducedTuning(NamedTuple):
     """That walk for each Nm that moves the arm, beside it [1 / sqrt s]."""
     inertia_doubt: float = 0.2
     """Deviation of a wearer's inertia from the nominal one, as a part of it."""
+    slow_doubt: float = 1.4
+    """Part of the moment that moves the arm by which others are unsure where readings are seldom, over the root of what
+    their period has beyond the usual one [1 / sqrt s]."""
+    cuff_frequency: float = 6.0
+    """At which the arm swings in a compliant cuff [Hz]: that of most tremor."""
     weight_doubt: float = 0.2
     """The same of the forearm's moment by its weight."""
     intended_time: float = 0.2
@@ -93,7 +100,7 @@ def reduced_elbow(
     """The filter's numbers.
 
     Args:
-        ecosystem: anatomy, device and machine; its person, weight and misalignment do not matter.
+        ecosystem: anatomy, device, cuff and machine; its person, weight and misalignment do not matter.
         period: between two readings [s].
         noise: standard deviation of angle [rad], rate [rad/s] and cuff's force [N], quantisation included.
         person: body that stands for everyone's; None: the average one of `Person`.
@@ -118,13 +125,35 @@ def reduced_elbow(
         angle_noise=angle, rate_noise=rate, force_noise=force, start_angle=0.01, start_rate=0.05,
         start_net=t.usual_net, start_grip=20.0, least_power=t.least**2,
         learning=1.0 - math.exp(-period / t.memory), walk=t.grip, walk_share=t.grip_share,
-        inertia_doubt=t.inertia_doubt, weight_doubt=t.weight_doubt,
+        inertia_doubt=math.hypot(t.inertia_doubt, _further_doubt(ecosystem, period, own, t) * inertia / own),
+        weight_doubt=t.weight_doubt,
         intended_keep=math.exp(-period / t.intended_time), intended_least=t.intended_least,
         intended_share=t.intended_share, left_keep=math.exp(-period / t.left_time), left_mean=t.left,
         left_deviation=t.left_deviation, load_mean=t.load, load_by_left=by_left, load_deviation=of_load,
         straight=low + NEAR, bent=high - NEAR, stop_doubt=t.stop_doubt,
     )  # fmt: skip
     return ReducedElbow(np.array(values, float), curves, disturbance)
+
+
+def _further_doubt(ecosystem: Ecosystem, period: float, inertia: float, t: ReducedTuning) -> float:
+    """Deviation of the moment of others over that which moves the arm, beside that by the inertia; of a device's own.
+
+    In a compliant cuff of stiffness k at a distance d the forearm turns by F / (k d) less than the hinge, so that at a
+    frequency w its acceleration is unsure by the part I_f w^2 / (k d^2) of what the cuff's moment changes. Where
+    readings are seldom, nothing tells what the moment does between two of them. Both are 0 in a rigid guide with
+    readings of 50 Hz and more.
+
+    Args:
+        ecosystem: has the cuff.
+        period: between two readings [s].
+        inertia: of the forearm about the elbow [kg m^2].
+        t: what is taken for granted.
+    """
+    seldom = t.slow_doubt * math.sqrt(max(period - USUAL_PERIOD, 0.0))
+    if ecosystem.cuff is None:
+        return seldom
+    stiffness = ecosystem.cuff.stiffness[0] * ecosystem.device.guide_distance**2
+    return math.hypot(seldom, inertia * (2.0 * math.pi * t.cuff_frequency) ** 2 / stiffness)
 
 
 def _over_a_period(period: float, tau: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:

@@ -52,11 +52,15 @@ NUMBERS = places((
 ))  # fmt: skip
 """Numbers of the filter; see reduced_elbow.py for what each is."""
 FAST, SLOW = 4, 2
+UNSEEN_RATE = 2.0
+"""Deviation of a rate that was not seen at the start [rad/s]."""
 
 
 @compiled
 def begin_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, learnt, out):
-    """Begin with first readings; where one of them is not finite, no estimate is a number.
+    """Begin with first readings; one that is missing, or no finite number, leaves its place to a guess that is unsure.
+
+    Where numbers come out that are not finite, no reading was worth anything, and all are left out.
 
     Args:
         sensed: readings, at the places of SENSED.
@@ -69,7 +73,16 @@ def begin_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, lear
         learnt: at the places of LEARNT; filled but for the count of new beginnings.
         out: at the places of ESTIMATE; filled.
     """
-    n = numbers
+    _start(sensed[SENSED.angle], sensed[SENSED.rate], numbers, curves, mean, fast, slow, learnt)
+    _correct_fast(sensed, numbers, mean, fast, learnt)
+    if not _conclude(numbers, curves, mean, fast, slow, out):
+        _start(math.nan, math.nan, numbers, curves, mean, fast, slow, learnt)
+        _conclude(numbers, curves, mean, fast, slow, out)
+
+
+@compiled
+def _start(angle, rate, n, curves, mean, fast, slow, learnt):
+    """What is believed at first, of an angle and a rate that are seen or not."""
     for i in range(FAST):
         mean[i] = 0.0
         for j in range(FAST):
@@ -77,19 +90,26 @@ def begin_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, lear
     for i in range(SLOW):
         for j in range(SLOW):
             slow[i, j] = 0.0
-    mean[BELIEF.angle], mean[BELIEF.rate] = sensed[SENSED.angle], sensed[SENSED.rate]
-    fast[0, 0], fast[1, 1] = n[NUMBERS.start_angle] ** 2, n[NUMBERS.start_rate] ** 2
+    reach = 0.5 * n[NUMBERS.angle_step] * (curves.shape[0] - 1)
+    mean[BELIEF.angle], fast[0, 0] = angle, n[NUMBERS.start_angle] ** 2
+    if not abs(angle) < math.inf:
+        # Anywhere between the ends of the table.
+        mean[BELIEF.angle], fast[0, 0] = n[NUMBERS.first_angle] + reach, reach**2
+    mean[BELIEF.rate], fast[1, 1] = rate, n[NUMBERS.start_rate] ** 2
+    if not abs(rate) < math.inf:
+        mean[BELIEF.rate], fast[1, 1] = 0.0, UNSEEN_RATE**2
     fast[2, 2], fast[3, 3] = n[NUMBERS.start_net] ** 2, n[NUMBERS.start_grip] ** 2
     learnt[LEARNT.net_power] = fast[2, 2]
     mean[BELIEF.intended], mean[BELIEF.left] = 0.0, n[NUMBERS.left_mean]
     slow[0, 0], slow[1, 1] = n[NUMBERS.intended_least] ** 2, n[NUMBERS.left_deviation] ** 2
-    _correct_fast(sensed, n, mean, fast, learnt)
-    _conclude(n, curves, mean, fast, slow, out)
 
 
 @compiled
 def step_estimates(sensed, numbers, curves, disturbance, mean, fast, slow, learnt, out):
     """Go on to the readings of the next period; where numbers are not finite any more, begin anew.
+
+    A reading that is no finite number is a missing one: what it would tell is left to the prediction, whose deviation
+    grows.
 
     Arguments are those of `begin_estimates`.
     """
@@ -137,7 +157,9 @@ def _correct_fast(sensed, n, mean, P, learnt):
 
 @compiled
 def _take(mean, P, reading, noise, h0, h1, h2, h3):
-    """Correct by one reading h . x with a variance of noise, in Joseph's form."""
+    """Correct by one reading h . x with a variance of noise, in Joseph's form; one that is no number tells nothing."""
+    if not abs(reading) < math.inf:
+        return
     v0 = P[0, 0] * h0 + P[0, 1] * h1 + P[0, 2] * h2 + P[0, 3] * h3
     v1 = P[1, 0] * h0 + P[1, 1] * h1 + P[1, 2] * h2 + P[1, 3] * h3
     v2 = P[2, 0] * h0 + P[2, 1] * h1 + P[2, 2] * h2 + P[2, 3] * h3

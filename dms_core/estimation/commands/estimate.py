@@ -12,7 +12,7 @@ from tyro.conf import Positional
 from dms_core.analyses.commands.ending import ended, gave_up, output_files
 from dms_core.command_line import FileOut, bar_of_run, moves
 from dms_core.errors import SimulationError
-from dms_core.estimation.filter.unscented import filter_of
+from dms_core.estimation.filter.forms import filter_of
 from dms_core.estimation.measurement import read_measurements
 from dms_core.estimation.record import Estimate, estimate
 from dms_core.estimation.settings import FilterSettings

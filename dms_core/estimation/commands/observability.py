@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 from dms_core.analyses.commands.ending import ended, gave_up, output_files
 from dms_core.command_line import FileOut, bar_of_run, moves
 from dms_core.errors import InputError, SimulationError
-from dms_core.estimation.filter.unscented import filter_of
+from dms_core.estimation.filter.forms import filter_of
 from dms_core.estimation.observability import Observability, empirical_observability, local_observability
 from dms_core.estimation.settings import Channel, FilterSettings
 from dms_core.files.output_file import write_csv, write_json

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
-from scipy.special import log_ndtr
+
+from dms_core.estimation.filter.cut import cut_moments
 
 
 class Corrected(NamedTuple):
@@ -57,32 +58,9 @@ def truncated(P: np.ndarray, k: int, mean: float, low: float, high: float) -> tu
     """
     deviation = math.sqrt(P[k, k])
     a, b = (low - mean) / deviation, (high - mean) / deviation
-    shift, share = _moments(a, b)
+    shift, share = cut_moments(a, b)
     column = P[:, k] / P[k, k]
     return column * (shift * deviation), symmetric(P - np.outer(column, column) * P[k, k] * (1.0 - share))
-
-
-FAR = 30.0
-"""Deviations beyond which what is left of the distribution lies at the bound."""
-
-
-def _moments(a: float, b: float) -> tuple[float, float]:
-    """Mean and variance of a standard normal distribution cut at a and b."""
-    if a > FAR:
-        return a + 1.0 / a, 1.0 / a**2
-    if b < -FAR:
-        return b + 1.0 / b, 1.0 / b**2
-    if a > 0.0:
-        # In the other tail the logarithm keeps its digits.
-        mean, variance = _moments(-b, -a)
-        return -mean, variance
-    log_mass = log_ndtr(b) + math.log1p(-math.exp(min(log_ndtr(a) - log_ndtr(b), -1e-300)))
-    at_a, at_b = (
-        math.exp(-0.5 * x * x - log_mass) / math.sqrt(2.0 * math.pi) if math.isfinite(x) else 0.0 for x in (a, b)
-    )
-    mean = at_a - at_b
-    ends = (a * at_a if math.isfinite(a) else 0.0) - (b * at_b if math.isfinite(b) else 0.0)
-    return mean, max(1.0 + ends - mean**2, 1e-12)
 
 
 def is_usable(P: np.ndarray) -> bool:

@@ -21,13 +21,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dms_core.assembly.derivatives.parameter_derivatives import system_with
 from dms_core.assembly.model import Model
 from dms_core.errors import SimulationError
 from dms_core.estimation.estimated import Belief, Estimated
 from dms_core.estimation.filter.charts import chart_at, placed
 from dms_core.estimation.filter.gaussian import corrected, gain, is_usable, truncated
 from dms_core.estimation.filter.nominal_world import NominalWorld
-from dms_core.estimation.filter.transition import Transitions, difference_step, in_chart, linear_here
+from dms_core.estimation.filter.transition import (
+    MovedNumber,
+    Transitions,
+    difference_step,
+    in_chart,
+    linear_here,
+    moved_number,
+)
 from dms_core.estimation.settings import FilterSettings
 
 ITERATIONS, SMALL = 20, 1e-9
@@ -128,17 +136,23 @@ class KalmanFilter:
         dt = t - belief.t
         steps = self._steps(dt)
         self.put(belief)
-        end = self._transitions.over(belief.chart, t, steps)
+        end = self._transitions.over(belief.chart, t, steps, self._moved_numbers(belief))
         n0, n1, m = belief.chart.size, end.chart.size, len(belief.rest)
         A = np.zeros((n1 + m, n0 + m))
         A[:n1, :n0], A[:n1, n0 : n0 + len(es.inputs)] = end.A, end.B
-        for k in range(len(es.constants)):
-            A[:n1, n0 + len(es.inputs) + k] = self._by_constant(belief, k, lambda b: end.chart.read(*self._end(b, t)))
+        A[:n1, n0 + len(es.inputs) : n0 + len(es.inputs) + len(es.constants)] = end.D
         F = es.factors(dt)
         A[n1:, n0:] = np.diag(F)
         rest = self._mean + F * (belief.rest - self._mean)
         P = A @ belief.P @ A.T + es.noise(end.chart, dt)
         return Predicted(Belief(t, end.q, end.v, rest, end.chart, 0.5 * (P + P.T)), belief.P @ A.T, A)
+
+    def _moved_numbers(self, belief: Belief) -> list[MovedNumber]:
+        """The constants, at the belief at which the world is."""
+        if not self.estimated.constants:
+            return []
+        system = system_with(self.model.system, self.estimated.numbers(belief.rest))
+        return [moved_number(self.world, belief.chart, key, system) for key in self.estimated.constants]
 
     def _steps(self, dt: float) -> int:
         """Implicit steps of a time [s]: as many as a period has, fewer of a part of it."""

@@ -56,6 +56,15 @@ class NominalWorld(World):
             into[:] = numbers
         self._written = dict(values)
 
+    @property
+    def declared_numbers(self) -> tuple[np.ndarray, ...]:
+        """Numbers of dynamics, constraints and sensors as they were when the world was made."""
+        return self._declared
+
+    def forget_numbers(self) -> None:
+        """Others may have written numbers: those of the next `put_numbers` are written in any case."""
+        self._written = {("", ""): np.nan}
+
     def go(self, t: float, steps: int) -> int:
         """Advance to t [s] in equal steps, in more of them where Newton's method needs it; gives their number.
 

@@ -13,12 +13,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as la
 
-from dms_core.assembly.model import Model
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.filter.charts import chart_at
 from dms_core.estimation.filter.gaussian import symmetric
 from dms_core.estimation.filter.kalman import Correction, KalmanFilter, Predicted
-from dms_core.estimation.settings import FilterSettings
 
 
 class UnscentedFilter(KalmanFilter):
@@ -65,8 +63,3 @@ class UnscentedFilter(KalmanFilter):
         here = self.moved(belief, belief.mean + K @ r)
         P = symmetric(belief.P - K @ S @ K.T)
         return Correction(replace(here, P=P), float(r @ la.solve(S, r, assume_a="pos")), r)
-
-
-def filter_of(model: Model, settings: FilterSettings) -> KalmanFilter:
-    """The filter of the form that the settings ask for."""
-    return (UnscentedFilter if settings.form == "unscented" else KalmanFilter)(model, settings)

@@ -53,15 +53,21 @@ CHART = fields(Chart)
 def new_chart(model: Model, q: np.ndarray, t: float = 0.0) -> Packed:
     """A packed Chart of the coordinates that tell the others best at q, shape (n_q,)."""
     at: Independent = independent(model, model.constraint_jacobian(q, t=t)[2])
-    n = len(at.second)
-    second, first, rows, chosen = (x.astype(np.int64) for x in (at.second, at.first, at.rows, at.chosen))
+    return packed_chart(model, at.chosen, at.rows)
+
+
+def packed_chart(model: Model, chosen: np.ndarray, rows: np.ndarray) -> Packed:
+    """A packed Chart of these independent coordinates, told by these rows of phi_q."""
+    at = np.flatnonzero(model.second_order), np.flatnonzero(~model.second_order), rows, chosen
+    second, first, rows, chosen = (x.astype(np.int64) for x in at)
+    n = len(second)
     G, W = (np.zeros((model.n_phi, model.n_q + 7)) for _ in range(2))
     storage = np.zeros((n, n)), np.zeros(len(rows)), np.zeros(n, np.int64), np.zeros(n)
     return Packed(Chart(second, first, rows, chosen, G, W, *storage))
 
 
 @compiled
-def _factor(a, order):
+def factor_square(a, order):
     """LU in place with row exchanges; gives the smallest pivot over the largest number its row began with."""
     n, weakest = a.shape[0], 1.0
     for k in range(n):
@@ -85,8 +91,8 @@ def _factor(a, order):
 
 
 @compiled
-def _solve(a, order, b):
-    """b becomes the solution."""
+def solve_factored(a, order, b):
+    """b becomes the solution of the system that `factor_square` has left in a and order."""
     n = a.shape[0]
     for k in range(n):
         b[k], b[order[k]] = b[order[k]], b[k]
@@ -144,7 +150,7 @@ def lift(m, s, chart, c):
         for i in range(n_z):
             if second[j] == chosen[i]:
                 a[n_r + i, j] = 1.0
-    if not _factor(a, order) > WEAKEST:
+    if not factor_square(a, order) > WEAKEST:
         return False
     for k in range(2 * n_z + first.shape[0]):
         dq[k, :] = 0.0
@@ -152,7 +158,7 @@ def lift(m, s, chart, c):
     for k in range(n_z):
         side[:] = 0.0
         side[n_r + k] = 1.0
-        _solve(a, order, side)
+        solve_factored(a, order, side)
         for j in range(n_s):
             dq[k, second[j]] = dv[n_z + k, second[j]] = side[j]
         side[:] = 0.0
@@ -160,7 +166,7 @@ def lift(m, s, chart, c):
             for j in range(n_s):
                 side[i] -= W[rows[i], second[j]] * dq[k, second[j]]
             side[i] /= sizes[i]
-        _solve(a, order, side)
+        solve_factored(a, order, side)
         for j in range(n_s):
             dv[k, second[j]] = side[j]
     for k in range(first.shape[0]):
@@ -186,4 +192,4 @@ def solve_square(chart):
 
     Its first rows are those of phi_q over `sizes`, its last ones pick the chosen coordinates.
     """
-    _solve(matrix(chart, CHART.square), ints(chart, CHART.order), floats(chart, CHART.side))
+    solve_factored(matrix(chart, CHART.square), ints(chart, CHART.order), floats(chart, CHART.side))

@@ -84,6 +84,7 @@ class SomeReadings:
 
     Attributes:
         found: derivatives of these components at the state that was read last.
+        moved: the sensors with each declared number moved to both sides, packed `Reading`s.
     """
 
     def __init__(self, model: Model, rows: Sequence[int], work: Work, directions: Sequence[Direction]) -> None:
@@ -104,11 +105,11 @@ class SomeReadings:
                 sensors = moved(calls, direction.sensors)
             return new_sensing(d, c, Packed(_some_calls(sensors, which)), composed, packed).values
 
-        self._moved = [Packed(Reading(sensing(1.0, x), sensing(-1.0, x))) for x in directions]
+        self.moved = [Packed(Reading(sensing(1.0, x), sensing(-1.0, x))) for x in directions]
         n, m, k = model.n_q + 7, model.n_phi, len(rows)
         self.found: Adjoints = new_adjoints(model, k, len(directions)).values
         partials = Partials(*(np.zeros((len(every), size)) for size in (n, n, n, m, len(model.layout.input_index))))
         self.packed = Packed(Readings(
             sensing(0.0, None), partials, np.searchsorted(every, rows).astype(np.int64), np.zeros((k, n)),
-            np.zeros((k, m)), np.array([x.table.ctypes.data for x in self._moved], np.int64), np.zeros(k), self.found,
+            np.zeros((k, m)), np.array([x.table.ctypes.data for x in self.moved], np.int64), np.zeros(k), self.found,
         ))  # fmt: skip

@@ -9,8 +9,8 @@ from scipy.stats import chi2
 
 from dms_core import Model
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings
+from dms_core.estimation.filter.forms import filter_of
 from dms_core.estimation.filter.kalman import KalmanFilter
-from dms_core.estimation.filter.unscented import filter_of
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import estimate
 from dms_core.estimation.settings import InitialDeviations, MotionNoise

@@ -7,7 +7,7 @@ import pytest
 
 from dms_core import Model, SolverOptions, simulate
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings
-from dms_core.estimation.filter.unscented import filter_of
+from dms_core.estimation.filter.forms import filter_of
 from dms_core.estimation.measurement import Measurements
 from dms_core.estimation.record import Estimate, estimate
 from dms_core.estimation.settings import InitialDeviations

@@ -28,7 +28,7 @@ def tables() -> list[list[list[str]]]:
     return [[[cell.strip() for cell in line[1:-1].split("|")] for line in x.splitlines()[2:]] for x in blocks]
 
 
-@pytest.mark.parametrize(("table", "file", "ending"), [(0, "elbow_estimation", "_Nm"), (2, "elbow_estimated", "")])
+@pytest.mark.parametrize(("table", "file", "ending"), [(0, "elbow_estimation", "_Nm"), (5, "elbow_estimated", "")])
 def test_the_table_is_that_of_the_file(table, file, ending):
     shown = tables()[table]
     with (DOCS / f"{file}.csv").open(encoding="utf-8") as stream:
@@ -46,4 +46,28 @@ def test_the_table_is_that_of_the_file(table, file, ending):
 
 
 def test_the_channels_of_the_page_are_those_of_the_group():
-    assert [cells[0].split("`")[1] for cells in tables()[1]] == list(ESTIMATE_NAMES)
+    assert [cells[0].split("`")[1] for cells in tables()[4]] == list(ESTIMATE_NAMES)
+
+
+@pytest.mark.parametrize(("table", "file"), [(1, "elbow_emg"), (3, "elbow_emg_causes")])
+def test_the_tables_with_electrodes_are_those_of_the_files(table, file):
+    shown = tables()[table]
+    with (DOCS / f"{file}.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(shown) == len(rows)
+    for cells, row in zip(shown, rows, strict=True):
+        assert float(cells[1]) == round(float(row["activation"]), 3)
+        assert cells[2] == f"{float(row['force_N']):.0f} N"
+        best, worst = (100.0 * float(row[f"force_{x}_muscle"]) for x in ("best", "worst"))
+        assert cells[3] == f"{best:.1f} % to {worst:.1f} %"
+        assert cells[4] == ("known" if "known load" in cells[0] else f"{float(row['load_kg']):.2f} kg")
+        assert cells[6] == f"{100.0 * float(row['moment_over_rms']):.1f} %"
+
+
+def test_the_table_of_causes_is_that_of_the_file():
+    shown = tables()[6]
+    with (DOCS / "elbow_causes.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(cells[1].rstrip(" %")) for cells in shown] == [
+        round(100.0 * float(row["error_over_rms"]), 1) for row in rows
+    ]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, World
+from exo_env.ecosystem.cuff import DAMPING, STIFFNESS
 from exo_env.ecosystem.person import HEIGHT_0, MASS_0
 from exo_env.envs.hidden_intent import HiddenIntentEnv
 from exo_env.envs.settings import DEFAULT_LOAD
@@ -200,16 +201,79 @@ def test_a_belief_that_is_not_finite_reads_no_table(what, place, broken):
     assert np.isnan(one.out).all()
 
 
-@pytest.mark.parametrize("reading", [np.nan, np.inf])
+NO_NUMBERS = [np.nan, np.inf, -np.inf]
+
+
+@pytest.mark.parametrize("reading", NO_NUMBERS)
 @pytest.mark.parametrize("place", range(3))
-def test_after_readings_that_are_no_numbers_the_filter_begins_anew(place, reading):
-    one, broken = Filter(0.02), np.array([0.8, 0.0, 3.0])
+def test_a_reading_that_is_no_number_is_a_missing_one(place, reading):
+    """All estimates go on, the deviation of what it would have told grows, and nothing else is lost."""
+    one, other, broken = Filter(0.02), Filter(0.02), np.array([0.8, 0.0, 3.0])
+    for x in (one, other):
+        for k in range(50):
+            x.take((0.8, 0.0, 3.0), k == 0)
     broken[place] = reading
-    assert np.isnan(one.take(broken, first=True)).all()
-    assert np.isfinite(one.take((0.8, 0.0, 3.0))).all()
-    assert np.isnan(one.take(broken)).all()
-    found = one.take((0.8, 0.0, 3.0))
-    assert np.isfinite(found).all() and one.learnt[LEARNT.lost] == 3.0
+    known, belief = one.take((0.8, 0.0, 3.0)), one.fast.copy()
+    for _ in range(25):
+        found = other.take(broken)
+        assert np.isfinite(found).all() and np.isfinite(other.fast).all()
+    told = (0, 1, 3)[place]
+    assert other.fast[told, told] > 1.2 * belief[told, told]
+    assert other.learnt[LEARNT.lost] == 0.0
+    assert abs(found[ESTIMATE.others_moment] - known[ESTIMATE.others_moment]) < found[ESTIMATE.others_moment_deviation]
+    for _ in range(100):
+        again = other.take((0.8, 0.0, 3.0))
+    assert again[ESTIMATE.others_moment] == pytest.approx(known[ESTIMATE.others_moment], abs=0.01)
+
+
+def test_readings_that_are_all_missing_are_predicted_only():
+    """As the exact solution says: nothing is corrected, so that the mean moves on and the covariance spreads."""
+    one = Filter(0.02)
+    for k in range(20):
+        one.take((0.8, 0.3, 3.0), k == 0)
+    mean, power, n = one.mean.copy(), one.learnt[LEARNT.net_power], one.elbow.numbers
+    P, net = one.fast.copy(), mean[2]
+    one.take((np.nan,) * 3)
+    assert one.mean[0] == pytest.approx(mean[0] + 0.02 * mean[1] + n[NUMBERS.angle_by_net] * net, rel=1e-14)
+    assert one.mean[3] == mean[3]
+    walk = n[NUMBERS.walk] + n[NUMBERS.walk_share] * math.sqrt(power)
+    assert one.fast[3, 3] == pytest.approx(P[3, 3] + 0.02 * walk**2, rel=1e-12)
+    for _ in range(5000):
+        assert np.isfinite(one.take((np.nan,) * 3)).all()
+
+
+@pytest.mark.parametrize("reading", [*NO_NUMBERS, 1e200, -1e308])
+@pytest.mark.parametrize("places", [(0,), (1,), (2,), (0, 1, 2)])
+def test_a_start_without_some_reading_is_a_guess(places, reading):
+    """Also where a reading is finite, but nothing that it leads to."""
+    one, broken = Filter(0.02), np.array([0.8, 0.0, 3.0])
+    broken[list(places)] = reading
+    first = one.take(broken, first=True)
+    assert np.isfinite(first).all() and np.isfinite(one.fast).all()
+    for _ in range(200):
+        found = one.take((0.8, 0.0, 3.0))
+        assert np.isfinite(found).all()
+    assert abs(found[ESTIMATE.others_moment] + 0.16 * 3.0) < 0.1
+    assert abs(one.mean[0] - 0.8) < 0.01
+
+
+def test_what_a_device_knows_of_itself_widens_its_deviation():
+    """A rate of readings below 50 Hz, and a cuff that gives way; in a rigid guide at 50 Hz and more nothing changes."""
+    place, doubt = NUMBERS.inertia_doubt, ReducedTuning().inertia_doubt
+
+    def found(period, **changes):
+        elbow = reduced_elbow(HiddenIntentEnv(**changes).ecosystem, period, NOISE)
+        return elbow.numbers[place]
+
+    assert [found(T) for T in (0.02, 0.01, 0.001)] == [doubt] * 3
+    assert doubt < found(0.05) < found(0.1) < found(0.2)
+    soft = {"stiffness": [1850.0, *STIFFNESS[1:]], "damping": list(DAMPING)}
+    assert doubt < found(0.02, cuff="compliant") < found(0.02, cuff=soft)
+    ecosystem = HiddenIntentEnv(cuff="compliant").ecosystem
+    share = Filter(0.02).elbow.numbers[NUMBERS.arm_share]
+    forearm, d = ecosystem.changed(person={}).arm().inertia_about_elbow(), ecosystem.device.guide_distance
+    part = forearm * (2.0 * math.pi * 6.0) ** 2 / (STIFFNESS[0] * d**2)
+    assert found(0.02, cuff="compliant") == pytest.approx(math.hypot(doubt, part / share), rel=1e-12)
 
 
 def test_the_usual_load_is_the_mean_of_what_is_drawn():

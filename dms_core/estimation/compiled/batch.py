@@ -1,0 +1,105 @@
+"""Many filters of one model at once, stepped in compiled code on several threads, without the Python lock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+
+from dms_core.assembly.model import Model
+from dms_core.errors import InputError, SimulationError
+from dms_core.estimation.compiled.arrays import CODE
+from dms_core.estimation.compiled.filter import CompiledFilter
+from dms_core.estimation.compiled.step import step_some
+from dms_core.estimation.settings import FilterSettings
+
+
+class FilterBatch:
+    """Filters side by side, each with a belief of its own; equal to single filters to the last bit.
+
+    Args:
+        model: a compiled model, that of the first filter; the others have models of the same system.
+        settings: of all filters.
+        size: number of filters.
+        threads: that step them; None takes one for each core.
+
+    Attributes:
+        filters: the single filters, whose `begin` and `belief` may be used between steps.
+
+    Raises:
+        InputError: as `CompiledFilter`, or there is no filter to make.
+
+    Example:
+        >>> batch = FilterBatch(model, settings, 64)
+        >>> batch.step(readings)                        # shape (64, channels)
+        >>> batch.filters[3].belief().mean
+    """
+
+    def __init__(self, model: Model, settings: FilterSettings, size: int, threads: int | None = None) -> None:
+        if size < 1 or (threads is not None and threads < 1):
+            raise InputError(
+                f"filter batch: Expected a size and threads of at least 1, got size = {size} and threads = {threads}."
+            )
+        # Constants are written into a model, so that each filter has its own.
+        models = [model, *(Model(model.system, like=model) for _ in range(size - 1))]
+        self.filters = [CompiledFilter(x, settings) for x in models]
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self.threads = min(size, threads or cores)
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+
+    @property
+    def names(self) -> list[str]:
+        """Channels, in the order of readings."""
+        return self.filters[0].names
+
+    def step(self, readings: np.ndarray) -> None:
+        """Predict all filters over a period and take the readings at its end.
+
+        Args:
+            readings: of each filter's channels, NaN where there is none, shape (size, channels).
+
+        Raises:
+            InputError: readings of another shape.
+            SimulationError: filters cannot go on (names them); they are where they were, and the others have stepped.
+        """
+        count = len(self.filters)
+        y = np.ascontiguousarray(readings, float)
+        if y.shape != (count, len(self.names)):
+            raise InputError(
+                f"filter batch: Expected readings of shape {(count, len(self.names))}, one row a filter and one column "
+                f"each of {', '.join(self.names)}; got shape {y.shape}."
+            )
+        kept = [x.keep() for x in self.filters]
+        addresses = np.array([x.packed.tables.table.ctypes.data for x in self.filters])
+        codes, options = np.zeros(count, np.int64), self.filters[0].kalman.world.numbers
+        ends = np.linspace(0, count, self.threads + 1).astype(int).tolist()
+        shares = [
+            partial(step_some, addresses, options, y, first, end, codes)
+            for first, end in zip(ends, ends[1:], strict=False)
+        ]
+        jobs = [self._pool.submit(share) for share in shares[1:]] if self._pool is not None else []
+        shares[0]()
+        for job in jobs:
+            job.result()
+        lost = []
+        for k in np.flatnonzero(codes != CODE.done).tolist():
+            try:
+                self.filters[k].recover(codes[k], kept[k](), self._by_name(y[k]), True)
+            except SimulationError as error:
+                lost.append(f"filter {k}: {error}")
+        if lost:
+            raise SimulationError(" ".join(lost))
+
+    def _by_name(self, row: Sequence[float] | np.ndarray) -> Mapping[str, float]:
+        """Readings of one filter by channel."""
+        return dict(zip(self.names, map(float, row), strict=True))
+
+    def close(self) -> None:
+        """End the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+        self.threads = 1
