@@ -55,6 +55,8 @@ def run(request, tmp_path):
         (own / name).write_text(text)
     env = os.environ | {"PYTHONPATH": os.pathsep.join([str(configs().parent), str(tmp_path)])}
     env.pop("NUMBA_CACHE_DIR", None)
+    # Python's own bytecode does not see an edit of the same length within the same second.
+    env["PYTHONDONTWRITEBYTECODE"] = "1"
     folder = {"beside the files": own / "__pycache__", "NUMBA_CACHE_DIR": tmp_path / "kept"}.get(request.param)
     if request.param == "NUMBA_CACHE_DIR":
         env["NUMBA_CACHE_DIR"] = str(folder)
