@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core import Model
-from dms_core.errors import SimulationError
+from dms_core.errors import InputError, SimulationError
 from dms_core.estimation import Channel, CompiledFilter, EstimatedConstant, EstimatedInput, FilterSettings
 from dms_core.estimation.estimated import Belief
 from dms_core.estimation.settings import InitialDeviations, MotionNoise
@@ -156,8 +156,15 @@ class MuscleEstimator:
         )  # fmt: skip
 
     def reset(self, readings: Mapping[str, float], load: float | None = None) -> MuscleEstimate:
-        """Begin with first readings, by channel, and the load where it is known [kg]."""
-        start = np.array([min(max(readings.get(emg_channel(m), 0.0), LEAST), 1.0) for m in self.muscles])
+        """Begin with first readings, by channel, and the load where it is known [kg].
+
+        Raises:
+            InputError: the hinge's angle is missing; of every other channel NaN tells nothing.
+        """
+        if not math.isfinite(readings.get(ANGLE, math.nan)):
+            raise InputError(f"'{ANGLE}': Expected the angle to begin with [rad], got {readings.get(ANGLE)}.")
+        shown = np.nan_to_num([readings.get(emg_channel(m), math.nan) for m in self.muscles], nan=LEAST)
+        start = np.clip(shown, LEAST, 1.0)
         weight = load if self.known.load and load is not None else self.tuning.load
         self._make(readings[ANGLE], weight, start)
         self._begin(self.filter.kalman.start())
@@ -170,17 +177,19 @@ class MuscleEstimator:
         self.filter = CompiledFilter(Model(system, like=self._model), self._settings())
 
     def _anew(self, readings: Mapping[str, float]) -> None:
-        """Begin at rest at the present hinge angle, with what is known beside the state."""
-        a = self.filter.arrays
-        rest, known = a.rest.copy(), a.P[-len(a.rest) :, -len(a.rest) :].copy()
-        self._make(readings[ANGLE], float(rest[self._first]), rest[2 : self._first])
-        belief = self.filter.kalman.start()
-        P = belief.P.copy()
-        P[-len(rest) :, -len(rest) :] = known
-        self.filter.begin(replace(belief, P=P, rest=rest))
+        """Begin at rest at the present hinge angle, with what is known beside the state, a period later."""
+        belief = self.filter.belief()
+        rest, n = belief.rest.copy(), len(belief.rest)
+        known = (belief.P + self._joined(belief))[-n:, -n:]
+        angle = readings.get(ANGLE, math.nan)
+        self._make(angle if math.isfinite(angle) else self._angle, float(rest[self._first]), rest[2 : self._first])
+        begun = self.filter.kalman.start()
+        P = begun.P.copy()
+        P[-n:, -n:] = known
+        self.filter.begin(replace(begun, t=belief.t + self.period, P=P, rest=rest))
 
     def _balance(self) -> None:
-        """Put the fibres where they are in balance with their tendons, in the belief as it is else."""
+        """A period without a step: put the fibres in balance with their tendons, and doubt what may have moved."""
         belief = self.filter.belief()
         q, v, index = belief.q.copy(), belief.v.copy(), self.filter.kalman.model.layout.index
         y, _ = self.filter.shown()
@@ -188,7 +197,16 @@ class MuscleEstimator:
             length = path_geometry(self.arm, self.elbow.path(self.arm, m), float(y[0]))[0]
             place = index[f"{m}.fibre_length"]
             q[place], v[place] = self.elbow.muscle(self.arm, m).equilibrium(length, float(belief.rest[2 + k])), 0.0
-        self.filter.begin(replace(belief, q=q, v=v))
+        # The arm is left where it was, and may have gone on by what its rate tells; the fibres were moved by hand.
+        chart, n = belief.chart, len(belief.chart.chosen)
+        P = belief.P + self._joined(belief)
+        P[np.arange(n), np.arange(n)] += (v[chart.chosen] * self.period) ** 2
+        P[np.arange(2 * n, chart.size), np.arange(2 * n, chart.size)] += FIBRE**2
+        self.filter.begin(replace(belief, t=belief.t + self.period, q=q, v=v, P=P))
+
+    def _joined(self, belief: Belief) -> np.ndarray:
+        """Covariance that joins in a period."""
+        return self.filter.kalman.estimated.noise(belief.chart, self.period)
 
     def _begin(self, belief: Belief) -> None:
         """Begin with a belief in which the constants, and their covariance, are those before anything was read."""
@@ -232,6 +250,7 @@ class MuscleEstimator:
         y, cov = self.filter.shown()
         m, a = len(self.muscles), self.filter.arrays
         forces, angle = y[-m:], y[0]
+        self._angle = float(angle)
         levers = np.array([np.interp(angle, self._angles, row) for row in self._levers])
         k = len(a.P) - len(a.rest) + self._first
         return MuscleEstimate(

@@ -13,7 +13,7 @@ from dms_core.compiled.arena import fields, floats, inner, ints, naturals
 from dms_core.compiled.jit import compiled
 from dms_core.simulation.iteration.order_watch import nearly_singular
 from dms_core.simulation.iteration.parts import PARTS, SINGULAR_PIVOT, run_part
-from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, METHOD, STATE, begin_matrix
+from dms_core.simulation.state import CLOCK, COUNTS, LARGEST, STATE, begin_matrix
 
 
 class Newton(NamedTuple):
@@ -34,14 +34,7 @@ MAX_ITERATIONS = 10
 MAX_HALVINGS = 5
 MAX_CLOSINGS = 6
 SLOW = 0.05
-"""Contraction above which an old matrix is not worth keeping, and below which none is trusted before it is seen."""
-FADING = 0.02
-"""The latter for SDIRK2, at most, over the stages since the matrix was made: one of a landing contracts by 0.001 to
-0.015 in the stage behind it, and by ten times that three stages later."""
-LOOSE = 0.1
-"""`newton_tol` from which on that holds: with a smaller one, runs that differ by little are to do so smoothly."""
-PREDICTED = 10.0
-"""What is left of the constraint errors by a closing correction, at most, over what the one before it tells."""
+"""Contraction above which an old matrix is not worth keeping, and below which no other is trusted before it is seen."""
 ROUNDING = 100.0
 """Correction, over the local error allowed, below which one that no longer shrinks beside a singular position is
 rounding: that of phi, 1e-16, comes back divided by the square of the smallest singular value of phi_q."""
@@ -189,48 +182,21 @@ def closing_correction(m, s, c0):
 
 
 @compiled
-def _shrink_errors(s, share):
-    """phi and phi_q v + phi_t of the last evaluation times a share."""
-    w = inner(s, STATE.w)
-    phi, phi_v = floats(w, WORK.phi), floats(w, WORK.phi_v)
-    for k in range(phi.shape[0]):
-        phi[k] *= share
-        phi_v[k] *= share
-
-
-@compiled
 def close_constraints(m, s, o, c0):
     """Bring phi and phi_q v below their tolerance by corrections that leave r1 and r2 alone; False if they resist.
 
     Newton's test looks at the tolerance of the run; constraints are to hold much better. Their rows alone are evaluated
     and solved for with the matrix at hand, at a third of the cost of a full iteration. Velocities are of the size of c0
-    times positions, and so is their tolerance. Corrections with one matrix shrink the errors alike: where the last two
-    evaluations tell that the next one would find them far below the tolerance, it is left out, and `phi` and `phi_v`
-    are what it would have found at most.
+    times positions, and so is their tolerance.
     """
-    enough, enough_v, before, before_v = o.constraint_tol, o.constraint_tol * max(1.0, 1e-3 * c0), 0.0, 0.0
-    for k in range(MAX_CLOSINGS):
+    for _ in range(MAX_CLOSINGS):
         run_part(m, s, PARTS.constraints)
         error, error_v = largest_errors(s)
-        if error <= enough and error_v <= enough_v:
+        if error <= o.constraint_tol and error_v <= o.constraint_tol * max(1.0, 1e-3 * c0):
             return True
         closing_correction(m, s, c0)
         apply(m, s, c0, floats(s, STATE.x), 1.0)
-        if k > 0:
-            share = PREDICTED * max(error / before, error_v / before_v)
-            if error * share <= enough and error_v * share <= enough_v:
-                _shrink_errors(s, share)
-                return True
-        before, before_v = error, error_v
     return False
-
-
-@compiled
-def _trusted(s, o):
-    """Contraction that a matrix is trusted to have at least before a second iteration has shown it."""
-    if o.method != METHOD.sdirk2 or o.newton_tol < LOOSE:
-        return SLOW
-    return min(SLOW, FADING * max(ints(s, STATE.counts)[COUNTS.age], 1))
 
 
 @compiled
@@ -270,7 +236,7 @@ def newton(m, s, o, c0, close):
             contraction = min(norm / before, 0.99) if before > 0.0 else 0.0
         apply(m, s, c0, x, 1.0)
         # What is left after this correction; before a second one, the contraction of earlier steps is a guess only.
-        left = norm * (contraction / (1.0 - contraction) if k > 0 else 3.0 * max(contraction, _trusted(s, o)))
+        left = norm * (contraction / (1.0 - contraction) if k > 0 else 3.0 * max(contraction, SLOW))
         if left < o.newton_tol and (not close or close_constraints(m, s, o, c0)):
             clock[CLOCK.contraction] = contraction
             if k > 1 and contraction > SLOW:

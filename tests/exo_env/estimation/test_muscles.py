@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, World
+from dms_core.errors import InputError, SimulationError
 from exo_env.ecosystem.gym_machine import GymMachine
 from exo_env.ecosystem.sensors import muscle_sensor
 from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, RATE
@@ -90,3 +91,38 @@ def test_a_load_cell_tells_the_load_and_electrodes_alone_know_that_they_do_not(r
     assert with_cell.load == pytest.approx(1.5, abs=0.1) and with_cell.load_deviation < 0.1
     assert without.load_deviation > 0.1
     assert ROPE_TENSION == CELL
+
+
+def test_a_period_without_a_step_passes_and_makes_nothing_surer(record, monkeypatch):
+    """Of what no reading tells: without readings a lost period leaves more doubt of everything, and its time passes."""
+    estimator = MuscleEstimator(elbow_with(), PERIOD)
+    estimator.reset(record[0][0])
+    for row in record[0][1:5]:
+        estimator.update(row)
+    before = estimator.filter.belief()
+    for _ in range(3):
+        monkeypatch.setattr(estimator.filter, "try_step", lambda readings: False)
+        estimator.update({})
+    after = estimator.filter.belief()
+    assert estimator.lost == 3 and after.t == pytest.approx(before.t + 3 * PERIOD)
+    assert after.chart.names == before.chart.names
+    assert (after.deviations >= before.deviations).all()
+    fibres = slice(2 * len(after.chart.chosen), after.chart.size)
+    assert (after.deviations[fibres] > before.deviations[fibres]).all()
+
+
+def test_readings_that_are_missing(record, monkeypatch):
+    """NaN of electrodes tells nothing; a start needs an angle, and beginning anew takes the one believed."""
+    estimator, first = MuscleEstimator(elbow_with(), PERIOD), record[0][0]
+    with pytest.raises(InputError, match=f"'{ANGLE}': Expected the angle to begin with"):
+        estimator.reset(first | {ANGLE: math.nan})
+    estimator.reset(first | {emg_channel("BRA"): math.nan})
+    missing = dict.fromkeys(first, math.nan)
+    assert np.isfinite(estimator.update(missing).forces).all()
+
+    def fails(readings):
+        raise SimulationError("no rates")
+
+    monkeypatch.setattr(type(estimator.filter), "try_step", lambda self, readings: fails(readings))
+    told = estimator.update(missing)
+    assert np.isfinite(told.forces).all() and estimator.lost == 1
