@@ -7,7 +7,8 @@ c_j + t f_j, |s| <= h_i and |t| <= h_j, have the least
 
 that is (1 + e_i) s - c t = f_i . d and (1 + e_j) t - c s = -f_j . d with c = f_i . f_j, a coordinate at its bound held
 there. Without e axes that are parallel would have no nearest points; with it these pass to the middle of what both
-share, as the axes come as near to parallel as PARALLEL. Elsewhere the distance errs by e s^2 / 2 |d|.
+share, as the axes come as near to parallel as PARALLEL. Elsewhere the distance errs by e s^2 / 2 |d|: at most 1e-5 of a
+length whose axes cross at the end, a length apart. A tilt theta in the plane of d moves the points by |d| theta / 2 e.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from __future__ import annotations
 from dms_core.compiled.jit import compiled
 from dms_core.model.geometry.rotations import dot
 
-PARALLEL = 1e-3
-"""Sine of the angle between the axes from which on their nearest points pass to the middles."""
+PARALLEL = 1e-2
+"""Sine of the angle between the axes from which on their nearest points pass to the middles. At a tenth of it a roller
+tilted by 1e-5 rocks between its ends in 8,000 steps where it now takes 3,000, or 500 on two contacts."""
 
 
 @compiled

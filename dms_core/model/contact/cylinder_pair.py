@@ -15,8 +15,8 @@ from dms_core.model.geometry.frames import unit
 class CylinderPairContact(Contact):
     """Contact of the sides of two cylinders, where their axes are nearest; half a sphere closes each end.
 
-    With parallel axes they touch in the middle of the length that both share. A body that is not to tilt or turn there
-    has two contacts, one for each half.
+    With parallel axes they touch in the middle of the length that both share. A body that tilts there rocks between the
+    ends, stiffly and with many small steps; two contacts, one for each half, bring it to rest along the other.
     """
 
     kind: ClassVar[str] = "cylinder_pair_contact"
