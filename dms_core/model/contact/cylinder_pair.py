@@ -17,6 +17,8 @@ class CylinderPairContact(Contact):
 
     With parallel axes they touch in the middle of the length that both share. A body that tilts there rocks between the
     ends, stiffly and with many small steps; two contacts, one for each half, bring it to rest along the other.
+
+    Axes that cross have no side on which they touch: there, as between spheres with one centre, is no force.
     """
 
     kind: ClassVar[str] = "cylinder_pair_contact"
