@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -71,6 +72,23 @@ class Estimated:
         self.biased = [name for name, channel in settings.channels.items() if channel.bias is not None]
         """Channels whose bias is estimated."""
         self._check_coordinates()
+
+    def readings(self, given: Mapping[str, float]) -> np.ndarray:
+        """Readings in the order of the channels, NaN where there is none or no finite number, shape (channels,).
+
+        Sensors of the model that are no channel tell nothing.
+
+        Raises:
+            InputError: the model has no sensor of a name.
+        """
+        for name in given:
+            if name not in self.outputs:
+                raise InputError(
+                    f"readings: the model has no sensor '{name}'. The channels are: {choices(self.settings.channels)}."
+                )
+        y = np.array([given.get(name, np.nan) for name in self.settings.channels], float)
+        y[~np.isfinite(y)] = np.nan
+        return y
 
     @cached_property
     def rest_names(self) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ def sensitivity(
         model: model file (YAML).
         time: length of the run [s].
         by: what is moved: a declared number (rod.mass, rope.path.1.point.0), an input, to which a constant is added
-            over the whole run, or an independent state at the start (q.rod.x, v.rod.x).
+            over the whole run, or an independent state at the start (q.rod.y, v.rod.y).
         out: CSV file to write.
         of: sensors (swing.angle) or states (q.rod.x, v.rod.x) at the end.
         integral_of: sensors, of which the integral over the run is differentiated; they follow those of --of.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dms_core import Model
-from dms_core.errors import SimulationError
+from dms_core.errors import InputError, SimulationError
 from dms_core.estimation import Channel, EstimatedInput, FilterSettings
 from dms_core.estimation.compiled.filter import CompiledFilter
 from dms_core.estimation.estimated import Belief
@@ -62,6 +62,18 @@ class Moment(NamedTuple):
     """Standard deviation of it [Nm]."""
 
 
+def first_angle(readings: Mapping[str, float]) -> float:
+    """The hinge's angle that a filter begins with [rad].
+
+    Raises:
+        InputError: it is missing.
+    """
+    angle = readings.get(ANGLE, math.nan)
+    if not math.isfinite(angle):
+        raise InputError(f"'{ANGLE}': Expected the angle to begin with [rad], got {angle}.")
+    return angle
+
+
 class ElbowEstimator:
     """Filter of one device on one arm.
 
@@ -108,8 +120,12 @@ class ElbowEstimator:
         )  # fmt: skip
 
     def reset(self, readings: Mapping[str, float]) -> Moment:
-        """Begin with first readings, by channel."""
-        kalman, hinge = self.filter.kalman, readings[ANGLE]
+        """Begin with first readings, by channel.
+
+        Raises:
+            InputError: the hinge's angle is missing; of every other channel NaN tells nothing.
+        """
+        kalman, hinge = self.filter.kalman, first_angle(readings)
         start, row = kalman.start(), kalman.estimated.outputs[ANGLE]
         for _ in range(TURNS):
             # Turn the model to the measured angle in steps that a projection follows.
@@ -131,7 +147,13 @@ class ElbowEstimator:
         return Belief(0.0, belief.q, belief.v, belief.rest, chart, kalman.estimated.first_covariance(chart))
 
     def update(self, readings: Mapping[str, float]) -> Moment:
-        """Take the readings of the next period, by channel; NaN where there is none."""
+        """Take the readings of the next period, by channel; NaN where there is none.
+
+        Raises:
+            InputError: there was no `reset` before.
+        """
+        if self._power == 0.0:
+            raise InputError("elbow estimator: Expected 'reset' with first readings before 'update'.")
         a, t = self.filter.arrays, self.tuning
         k = len(a.P) - len(a.rest)
         power = max(self._power, t.least**2)

@@ -23,7 +23,7 @@ from dms_core.model.muscles.activation import MINIMUM
 from exo_env.ecosystem.arm import excitation_name, path_geometry
 from exo_env.ecosystem.gym_machine import WEIGHT
 from exo_env.ecosystem.sensors import muscle_sensor
-from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, RATE
+from exo_env.estimation.elbow_estimator import ANGLE, GUIDE_FORCE, RATE, first_angle
 from exo_env.estimation.muscle_elbow import DEVICE, REST, ROPE_TENSION, MuscleElbow
 
 CELL = ROPE_TENSION
@@ -116,6 +116,16 @@ class MuscleEstimator:
         self.tuning, self.known = tuning or MuscleTuning(), known or Known()
         self.arm = elbow.arm()
         self.muscles = self.arm.muscles
+        if not (isinstance(steps, int | np.integer) and steps >= 1):
+            raise InputError(f"muscle estimator: steps = {steps!r}: Expected a whole number of at least 1.")
+        strength = self.known.strength
+        if strength is not None and np.shape(strength) != (len(self.muscles),):
+            raise InputError(
+                f"muscle estimator: strength: Expected the largest force of each of {len(self.muscles)} muscles [N], "
+                f"got shape {np.shape(strength)}."
+            )
+        self._first: int = 0
+        """Place of the load among inputs and constants, once there was a reset."""
         self.lost = 0
         """Times that the equations could not be stepped, and fibres were put in balance with their tendons."""
         angles = np.radians(np.arange(-10.0, 160.0, 2.0))
@@ -159,14 +169,16 @@ class MuscleEstimator:
         """Begin with first readings, by channel, and the load where it is known [kg].
 
         Raises:
-            InputError: the hinge's angle is missing; of every other channel NaN tells nothing.
+            InputError: the hinge's angle is missing, or a load that is to be known; of every other channel NaN tells
+                nothing.
         """
-        if not math.isfinite(readings.get(ANGLE, math.nan)):
-            raise InputError(f"'{ANGLE}': Expected the angle to begin with [rad], got {readings.get(ANGLE)}.")
+        angle = first_angle(readings)
+        if self.known.load and load is None:
+            raise InputError("muscle estimator: Expected 'load' [kg] with the first readings, since it is to be known.")
         shown = np.nan_to_num([readings.get(emg_channel(m), math.nan) for m in self.muscles], nan=LEAST)
         start = np.clip(shown, LEAST, 1.0)
         weight = load if self.known.load and load is not None else self.tuning.load
-        self._make(readings[ANGLE], weight, start)
+        self._make(angle, weight, start)
         self._begin(self.filter.kalman.start())
         self.filter.correct(readings)
         return self._told()
@@ -228,7 +240,13 @@ class MuscleEstimator:
         self.filter.begin(replace(belief, P=P, rest=rest))
 
     def update(self, readings: Mapping[str, float], load: float | None = None) -> MuscleEstimate:
-        """Take the readings of the next period, by channel, NaN where there is none, and the load where it is known."""
+        """Take the readings of the next period, by channel, NaN where there is none, and the load where it is known.
+
+        Raises:
+            InputError: there was no `reset` before.
+        """
+        if self._first == 0:
+            raise InputError("muscle estimator: Expected 'reset' with first readings before 'update'.")
         a = self.filter.arrays
         if self.known.load and load is not None:
             a.rest[self._first] = load

@@ -15,6 +15,7 @@ from dms_core.estimation.compiled.arrays import CODE
 from dms_core.estimation.compiled.filter import CompiledFilter
 from dms_core.estimation.compiled.step import step_some
 from dms_core.estimation.settings import FilterSettings
+from dms_core.validation import shown
 
 
 class FilterBatch:
@@ -39,10 +40,9 @@ class FilterBatch:
     """
 
     def __init__(self, model: Model, settings: FilterSettings, size: int, threads: int | None = None) -> None:
-        if size < 1 or (threads is not None and threads < 1):
-            raise InputError(
-                f"filter batch: Expected a size and threads of at least 1, got size = {size} and threads = {threads}."
-            )
+        for name, number in (("size", size), ("threads", threads)):
+            if number is not None and (not isinstance(number, int | np.integer) or number < 1):
+                raise InputError(f"filter batch: {name} = {number!r}: Expected a whole number of at least 1.")
         # Constants are written into a model, so that each filter has its own.
         models = [model, *(Model(model.system, like=model) for _ in range(size - 1))]
         self.filters = [CompiledFilter(x, settings) for x in models]
@@ -59,19 +59,26 @@ class FilterBatch:
         """Predict all filters over a period and take the readings at its end.
 
         Args:
-            readings: of each filter's channels, NaN where there is none, shape (size, channels).
+            readings: of each filter's channels, NaN where there is none, shape (size, channels). What is no finite
+                number tells nothing.
 
         Raises:
             InputError: readings of another shape.
             SimulationError: filters cannot go on (names them); they are where they were, and the others have stepped.
         """
         count = len(self.filters)
-        y = np.ascontiguousarray(readings, float)
+        try:
+            y = np.ascontiguousarray(readings, float)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"filter batch: Expected readings as an array of numbers, got {shown(readings)}."
+            ) from None
         if y.shape != (count, len(self.names)):
             raise InputError(
                 f"filter batch: Expected readings of shape {(count, len(self.names))}, one row a filter and one column "
                 f"each of {', '.join(self.names)}; got shape {y.shape}."
             )
+        y = np.where(np.isfinite(y), y, np.nan)
         kept = [x.keep() for x in self.filters]
         addresses = np.array([x.packed.tables.table.ctypes.data for x in self.filters])
         codes, options = np.zeros(count, np.int64), self.filters[0].kalman.world.numbers

@@ -56,9 +56,13 @@ class CompiledFilter:
         self.packed.aim(self.kalman.settings.period, self.kalman.settings.steps)
 
     def step(self, readings: Mapping[str, float]) -> None:
-        """Predict over a period and take the readings at its end, by channel; NaN and a missing name tell nothing.
+        """Predict over a period and take the readings at its end, by channel.
+
+        A missing name and what is no finite number tell nothing. A channel's `delay` is that of records: here a reading
+        counts as one of the present.
 
         Raises:
+            InputError: the model has no sensor of a name.
             SimulationError: the filter cannot go on; `belief` is what it was before.
         """
         self._call(readings, True)
@@ -66,7 +70,7 @@ class CompiledFilter:
     def try_step(self, readings: Mapping[str, float]) -> bool:
         """As `step`, in compiled code alone; False where that cannot go on, and the filter is where it was before."""
         before = self.keep()
-        self.arrays.reading[:] = [readings.get(name, np.nan) for name in self.names]
+        self.arrays.reading[:] = self.kalman.estimated.readings(readings)
         if self.packed.step() == CODE.done:
             return True
         self.begin(before())
@@ -83,7 +87,7 @@ class CompiledFilter:
     def _call(self, readings: Mapping[str, float], moving: bool) -> None:
         """One compiled call; where that cannot go on, the same in Python."""
         before = self.keep()
-        self.arrays.reading[:] = [readings.get(name, np.nan) for name in self.names]
+        self.arrays.reading[:] = self.kalman.estimated.readings(readings)
         code = self.packed.step() if moving else self.packed.correct()
         if code != CODE.done:
             self.recover(code, before(), readings, moving)

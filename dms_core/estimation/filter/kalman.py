@@ -212,15 +212,17 @@ class KalmanFilter:
     def correct(self, belief: Belief, readings: dict[str, float]) -> Correction:
         """The belief behind readings of channels, by name, in SI units.
 
-        Those that are NaN tell nothing, and nor do sensors that are no channel of the settings.
+        Those that are no finite number tell nothing, and nor do sensors that are no channel of the settings.
 
         Raises:
+            InputError: the model has no sensor of a name.
             SimulationError: no state on the constraints is near the corrected one, or the result is not finite.
         """
-        names = [name for name in self.settings.channels if not np.isnan(readings.get(name, np.nan))]
+        taken = self.estimated.readings(readings)
+        names = [name for name, x in zip(self.settings.channels, taken, strict=True) if not np.isnan(x)]
         if not names:
             return Correction(belief, 0.0, np.zeros(0))
-        y = np.array([readings[name] for name in names])
+        y = taken[~np.isnan(taken)]
         R = np.diag([self.settings.channels[name].variance for name in names])
         result = self._corrected(belief, names, y, R)
         bounded = self.within_bounds(result.belief)

@@ -143,6 +143,19 @@ def test_what_it_cannot_follow_is_said_and_the_belief_stays():
     np.testing.assert_array_equal(quick.belief().q, before.q)
 
 
+def test_readings_of_nobody_are_refused():
+    """A sensor that is no channel tells nothing; a name that no sensor has is a mistake, in Python alike."""
+    quick = CompiledFilter(
+        Model(driven_four_bar()), FilterSettings(channels={"crank_angle.angle": {"deviation": 0.01}})
+    )
+    start = quick.belief()
+    for take in (quick.step, quick.correct, lambda y: quick.kalman.correct(start, y)):
+        with pytest.raises(InputError, match=r"no sensor 'crank_angle.angel'. The channels are: crank_angle.angle"):
+            take({"crank_angle.angel": 0.9})
+    quick.correct({"rocker_angle.angle": 0.2, "crank_angle.angle": np.inf})
+    assert np.array_equal(quick.belief().mean, start.mean) and quick.nis == (0.0, 0)
+
+
 class TestBatch:
     """Many filters of one model in one compiled call."""
 
@@ -195,8 +208,19 @@ class TestBatch:
         batch = FilterBatch(Model(masses()), FilterSettings(channels={"at0.position.x": {"deviation": 1.0}}), 2, 1)
         with pytest.raises(InputError, match="Expected readings of shape"):
             batch.step(np.zeros((3, 1)))
-        with pytest.raises(InputError, match="at least 1, got size = 0"):
-            FilterBatch(Model(masses()), batch.filters[0].kalman.settings, 0)
+        with pytest.raises(InputError, match="Expected readings as an array of numbers"):
+            batch.step({"at0.position.x": 0.0})
+        for given, said in (((0,), "size = 0"), ((2.5,), "size = 2.5"), ((2, 0), "threads = 0")):
+            with pytest.raises(InputError, match=f"{said}: Expected a whole number of at least 1"):
+                FilterBatch(Model(masses()), batch.filters[0].kalman.settings, *given)
+
+    def test_what_is_no_finite_number_is_missing(self):
+        settings = FilterSettings(channels={"at0.position.x": {"deviation": 1.0}})
+        batch = FilterBatch(Model(masses()), settings, 4, 1)
+        batch.step(np.array([[np.nan], [np.inf], [-np.inf], [0.1]]))
+        means = [x.belief().mean for x in batch.filters]
+        assert np.array_equal(means[1], means[0]) and np.array_equal(means[2], means[0])
+        assert not np.array_equal(means[3], means[0])
 
 
 def test_records_are_filtered_by_compiled_steps_where_they_can():

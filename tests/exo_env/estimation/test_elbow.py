@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dms_core import Model, SolverOptions, World
+from dms_core.errors import InputError
 from dms_core.estimation import EstimatedInput, FilterSettings, KalmanFilter
 from dms_core.estimation.observability import local_observability
 from dms_core.model import Constant, Input, LumpedLoad, System
@@ -55,6 +56,15 @@ def test_a_start_at_any_angle(estimator):
         kalman = estimator.filter.kalman
         y = kalman.read(estimator.filter.belief())
         assert y[kalman.estimated.outputs[ANGLE]] == pytest.approx(angle, abs=2e-3)
+
+
+def test_what_a_start_needs():
+    fresh = ElbowEstimator(NominalElbow(), 0.01)
+    with pytest.raises(InputError, match="Expected 'reset' with first readings"):
+        fresh.update({ANGLE: 0.8})
+    for given in ({}, {ANGLE: float("nan")}):
+        with pytest.raises(InputError, match=f"'{ANGLE}': Expected the angle to begin with"):
+            fresh.reset(given)
 
 
 def test_readings_that_are_missing_widen_the_deviation(estimator):

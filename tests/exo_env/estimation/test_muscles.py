@@ -126,3 +126,22 @@ def test_readings_that_are_missing(record, monkeypatch):
     monkeypatch.setattr(type(estimator.filter), "try_step", lambda self, readings: fails(readings))
     told = estimator.update(missing)
     assert np.isfinite(told.forces).all() and estimator.lost == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"steps": 0}, "steps = 0: Expected a whole number"),
+        ({"known": Known(strength=np.ones(3))}, r"largest force of each of 6 muscles \[N\], got shape \(3,\)"),
+    ],
+)
+def test_arguments_that_do_not_fit(given, message):
+    with pytest.raises(InputError, match=message):
+        MuscleEstimator(elbow_with(), PERIOD, **given)
+
+
+def test_what_is_to_come_first(record):
+    with pytest.raises(InputError, match="Expected 'reset' with first readings"):
+        MuscleEstimator(elbow_with(), PERIOD).update(record[0][0])
+    with pytest.raises(InputError, match="Expected 'load'"):
+        MuscleEstimator(elbow_with(), PERIOD, known=Known(load=True)).reset(record[0][0])
