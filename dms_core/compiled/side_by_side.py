@@ -20,6 +20,7 @@ from importlib import import_module
 from typing import Any
 
 from dms_core.compiled.compilation import announce_waiting
+from dms_core.compiled.threads import processors
 
 COMMAND = "import sys; from dms_core.compiled.side_by_side import work; work(sys.argv[1:])"
 
@@ -45,7 +46,7 @@ def begin(work: Sequence[str], last: Any) -> None:
     # Processes of a pool leave it to their parent, which has begun already.
     if _process is not None or multiprocessing.parent_process() is not None or not sys.executable:
         return
-    if _processors() < 2 or _on_disk(last):
+    if processors() < 2 or _on_disk(last):
         return
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(p or os.getcwd() for p in sys.path)}
     with contextlib.suppress(OSError):
@@ -83,8 +84,3 @@ def _on_disk(function: Any) -> bool:
     """Whether there is machine code of a function that fits, or no place to keep any."""
     kept = function._cache
     return kept.cache_path is None or kept.fits
-
-
-def _processors() -> int:
-    """Processors that this process may use, where the system says so."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -48,6 +48,11 @@ class Belief:
         return np.hstack([self.chart.dq, nothing]), np.hstack([self.chart.dv, nothing])
 
 
+def finite_or_missing(readings: np.ndarray) -> np.ndarray:
+    """Readings with NaN, which tells nothing, in place of what is no finite number."""
+    return np.where(np.isfinite(readings), readings, np.nan)
+
+
 class Estimated:
     """Names and places of what is estimated, and the noise that drives it.
 
@@ -86,9 +91,7 @@ class Estimated:
                 raise InputError(
                     f"readings: the model has no sensor '{name}'. The channels are: {choices(self.settings.channels)}."
                 )
-        y = np.array([given.get(name, np.nan) for name in self.settings.channels], float)
-        y[~np.isfinite(y)] = np.nan
-        return y
+        return finite_or_missing(np.array([given.get(name, np.nan) for name in self.settings.channels], float))
 
     @cached_property
     def rest_names(self) -> tuple[str, ...]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from dms_core.compiled.jit import compiled
+from dms_core.compiled.threads import Threads
 from dms_core.kernels import DONE, Packed, floats, inner, ints, table_at
 from exo_env.tables import OBSERVER, STATUS, TASK, WORLD
 from exo_env.world.kernels.control_period import run_period
@@ -99,7 +98,7 @@ class Batch:
     """
 
     def __init__(self, size: int, observed: int, terms: int, reported: np.ndarray, threads: int | None = None) -> None:
-        self.threads = min(size, threads or _cores())
+        self._team = Threads(size, threads)
         self._addresses, self._reported = np.zeros(size, np.int64), reported
         self._areas = np.zeros((size, AREAS, 2), np.int64)
         # Compiled code knows addresses only: what they point to is kept here.
@@ -107,9 +106,11 @@ class Batch:
         self.observations = np.zeros((size, observed), np.float32)
         self.numbers = np.zeros((size, 1 + terms + len(reported)))
         self.status = np.zeros((size, len(STATUS)), np.int64)
-        self._pool: ThreadPoolExecutor | None = None
-        self._process = 0
-        """Process in which the threads were made."""
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that step the worlds."""
+        return self._team.count
 
     def put(self, i: int, world: Packed) -> None:
         """Make the packed WorldTables world i."""
@@ -150,45 +151,9 @@ class Batch:
 
     def _share(self, count: int, work: Callable, *arguments: Any) -> None:
         """Do `count` pieces of work on all threads; its last argument counts those that are taken."""
-        share, jobs = partial(work, *arguments, np.zeros(1, np.int64)), list[Future]()
-        # The thread that calls works, too.
-        others = min(self.threads, count) - 1
-        try:
-            if others > 0:
-                pool = self._helpers()
-                jobs += [pool.submit(share) for _ in range(others)]
-            share()
-        finally:
-            _wait(jobs)
-        for job in jobs:
-            job.result()
-
-    def _helpers(self) -> ThreadPoolExecutor:
-        """The other threads; a process that was forked has those of its parent no more, and makes its own."""
-        if self._pool is None or self._process != os.getpid():
-            self._pool, self._process = ThreadPoolExecutor(self.threads - 1), os.getpid()
-        return self._pool
+        share = partial(work, *arguments, np.zeros(1, np.int64))
+        self._team.run([share] * max(min(self.threads, count), 1))
 
     def close(self) -> None:
         """End the threads."""
-        if self._pool is not None and self._process == os.getpid():
-            self._pool.shutdown()
-        self._pool, self.threads = None, 1
-
-
-def _wait(jobs: list[Future]) -> None:
-    """Wait to the end: an interrupt must not leave threads behind that still write."""
-    interrupt = None
-    while True:
-        try:
-            wait(jobs)
-            break
-        except KeyboardInterrupt as error:
-            interrupt = error
-    if interrupt is not None:
-        raise interrupt
-
-
-def _cores() -> int:
-    """Number of cores that this process may use, where the system says so, or else of all."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self._team.close()

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from dms_core.assembly.model import Model
+from dms_core.compiled.threads import Threads
 from dms_core.errors import InputError, SimulationError
 from dms_core.estimation.compiled.arrays import CODE
 from dms_core.estimation.compiled.filter import CompiledFilter
 from dms_core.estimation.compiled.step import step_some
+from dms_core.estimation.estimated import finite_or_missing
 from dms_core.estimation.settings import FilterSettings
 from dms_core.validation import shown
 
@@ -46,9 +47,7 @@ class FilterBatch:
         # Constants are written into a model, so that each filter has its own.
         models = [model, *(Model(model.system, like=model) for _ in range(size - 1))]
         self.filters = [CompiledFilter(x, settings) for x in models]
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        self.threads = min(size, threads or cores)
-        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._team = Threads(size, threads)
 
     @property
     def names(self) -> list[str]:
@@ -78,19 +77,12 @@ class FilterBatch:
                 f"filter batch: Expected readings of shape {(count, len(self.names))}, one row a filter and one column "
                 f"each of {', '.join(self.names)}; got shape {y.shape}."
             )
-        y = np.where(np.isfinite(y), y, np.nan)
+        y = finite_or_missing(y)
         kept = [x.keep() for x in self.filters]
         addresses = np.array([x.packed.tables.table.ctypes.data for x in self.filters])
         codes, options = np.zeros(count, np.int64), self.filters[0].kalman.world.numbers
-        ends = np.linspace(0, count, self.threads + 1).astype(int).tolist()
-        shares = [
-            partial(step_some, addresses, options, y, first, end, codes)
-            for first, end in zip(ends, ends[1:], strict=False)
-        ]
-        jobs = [self._pool.submit(share) for share in shares[1:]] if self._pool is not None else []
-        shares[0]()
-        for job in jobs:
-            job.result()
+        ends = np.linspace(0, count, self._team.count + 1).astype(int).tolist()
+        self._team.run([partial(step_some, addresses, options, y, *share, codes) for share in pairwise(ends)])
         lost = []
         for k in np.flatnonzero(codes != CODE.done).tolist():
             try:
@@ -106,7 +98,4 @@ class FilterBatch:
 
     def close(self) -> None:
         """End the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool = None
-        self.threads = 1
+        self._team.close()

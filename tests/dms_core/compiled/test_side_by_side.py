@@ -28,7 +28,7 @@ def fresh(monkeypatch, tmp_path):
     """No second process has begun, and none of the code of a function is on disk; gives that function."""
     monkeypatch.setattr(side_by_side, "_process", None)
     monkeypatch.setattr(side_by_side, "_done", set())
-    monkeypatch.setattr(side_by_side, "_processors", lambda: 2)
+    monkeypatch.setattr(side_by_side, "processors", lambda: 2)
     monkeypatch.setattr(side_by_side.atexit, "register", lambda *function: None)
     (tmp_path / "pieces.py").write_text(WORK)
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -52,7 +52,7 @@ def test_nothing_begins_where_the_code_is_on_disk(fresh):
 
 
 def test_nothing_begins_on_one_processor(fresh, monkeypatch):
-    monkeypatch.setattr(side_by_side, "_processors", lambda: 1)
+    monkeypatch.setattr(side_by_side, "processors", lambda: 1)
     side_by_side.begin(["pieces:first"], fresh)
     assert side_by_side._process is None
     side_by_side.wait_for("pieces:first")

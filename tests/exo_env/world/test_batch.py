@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from dms_core.compiled import threads as threads_module
 from dms_core.errors import InputError, SimulationError
 from exo_env.envs.elbow_lift import ElbowLiftEnv, ElbowLiftVectorEnv
 from exo_env.world import batch as batch_module
@@ -211,7 +212,7 @@ def test_an_interrupt_waits_for_the_threads(monkeypatch):
         time.sleep(0.3)
         done.append(True)
 
-    calls, real = [], batch_module.wait
+    calls, real = [], threads_module.wait
 
     def interrupted(jobs):
         calls.append(jobs)
@@ -219,7 +220,7 @@ def test_an_interrupt_waits_for_the_threads(monkeypatch):
             raise KeyboardInterrupt
         return real(jobs)
 
-    monkeypatch.setattr(batch_module, "wait", interrupted)
+    monkeypatch.setattr(threads_module, "wait", interrupted)
     monkeypatch.setattr(batch_module, "run_some", slow)
     with pytest.raises(KeyboardInterrupt):
         batch.run(np.arange(2), np.zeros((4, 2)))
