@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -73,8 +73,8 @@ def write_csv(
         for k, part in enumerate((columns,) if isinstance(columns, Mapping) else columns()):
             if k == 0:
                 file.write(_head(list(part)))
-            table = [np.asarray(column, None if _words(column) else float) for column in part.values()]
-            file.writelines(f"{','.join(map(_cell, row))}\n".encode() for row in zip(*table, strict=True))
+            cells = [_cells(np.asarray(column)) for column in part.values()]
+            file.writelines(f"{','.join(row)}\n".encode() for row in zip(*cells, strict=True))
 
     write_file(path, content)
 
@@ -116,14 +116,11 @@ def check_size(option: str, seconds: float, sample: float, columns: int) -> None
         )
 
 
-def _words(column: np.ndarray) -> bool:
-    """Whether a column holds words."""
-    return np.asarray(column).dtype.kind == "U"
-
-
-def _cell(value: Any) -> str:
-    """A word, or a number with DIGITS."""
-    return _quoted([value]) if isinstance(value, str) else format(value, DIGITS)
+def _cells(column: np.ndarray) -> Iterator[str]:
+    """Cells of a column, one by one: words, or numbers with DIGITS."""
+    if column.dtype.kind == "U":
+        return (_quoted([word]) for word in column)
+    return (format(x, DIGITS) for x in column.astype(float, copy=False))
 
 
 def _head(names: list[str]) -> bytes:

@@ -65,24 +65,16 @@ def do_part(w, part):
 
 
 @compiled
-def _keep(memory, kept):
-    """Copy all numbers of the memory into `kept`."""
+def _copy(memory, kept, back):
+    """Copy all numbers of the memory into `kept`, or back from there."""
     k = 0
     for f in range(memory.shape[0]):
         x = floats(memory, f)
         for i in range(x.shape[0]):
-            kept[k] = x[i]
-            k += 1
-
-
-@compiled
-def _put_back(memory, kept):
-    """Copy them back."""
-    k = 0
-    for f in range(memory.shape[0]):
-        x = floats(memory, f)
-        for i in range(x.shape[0]):
-            x[i] = kept[k]
+            if back:
+                x[i] = kept[k]
+            else:
+                kept[k] = x[i]
             k += 1
 
 
@@ -101,7 +93,7 @@ def difference_part(w, part, memory, read, written, kept, slope):
         kept: storage for the memory.
         slope: shape (m, n).
     """
-    _keep(memory, kept)
+    _copy(memory, kept, False)
     for j in range(read.shape[0]):
         x = floats(memory, read[j, 0])
         h = DIFFERENCE * max(abs(x[read[j, 1]]), 1.0)
@@ -111,7 +103,7 @@ def difference_part(w, part, memory, read, written, kept, slope):
             for i in range(written.shape[0]):
                 after = floats(memory, written[i, 0])[written[i, 1]]
                 slope[i, j] = after if sign > 0.0 else (slope[i, j] - after) / (2.0 * h)
-            _put_back(memory, kept)
+            _copy(memory, kept, True)
 
 
 @compiled

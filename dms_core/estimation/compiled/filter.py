@@ -69,12 +69,10 @@ class CompiledFilter:
 
     def try_step(self, readings: Mapping[str, float]) -> bool:
         """As `step`, in compiled code alone; False where that cannot go on, and the filter is where it was before."""
-        before = self.keep()
-        self.arrays.reading[:] = self.kalman.estimated.readings(readings)
-        if self.packed.step() == CODE.done:
-            return True
-        self.begin(before())
-        return False
+        code, before = self._compiled(readings, True)
+        if code != CODE.done:
+            self.begin(before())
+        return code == CODE.done
 
     def correct(self, readings: Mapping[str, float]) -> None:
         """Take readings at the present time.
@@ -86,11 +84,15 @@ class CompiledFilter:
 
     def _call(self, readings: Mapping[str, float], moving: bool) -> None:
         """One compiled call; where that cannot go on, the same in Python."""
-        before = self.keep()
-        self.arrays.reading[:] = self.kalman.estimated.readings(readings)
-        code = self.packed.step() if moving else self.packed.correct()
+        code, before = self._compiled(readings, moving)
         if code != CODE.done:
             self.recover(code, before(), readings, moving)
+
+    def _compiled(self, readings: Mapping[str, float], moving: bool) -> tuple[int, Callable[[], Belief]]:
+        """One compiled call; gives its code, and the belief that was before."""
+        before = self.keep()
+        self.arrays.reading[:] = self.kalman.estimated.readings(readings)
+        return self.packed.step() if moving else self.packed.correct(), before
 
     def keep(self) -> Callable[[], Belief]:
         """The present belief, which is made of copies of arrays when it is asked for."""

@@ -24,6 +24,13 @@ def weighted(run, given, numbers=None):
     return (torch.linspace(1.0, 2.0, len(found), dtype=torch.float64)[:, None] * scales * found).sum()
 
 
+def gradient_of(run, actions):
+    """Of the weighted sum, by the actions."""
+    given = torch.tensor(actions, requires_grad=True)
+    weighted(run, given).backward()
+    return given.grad.numpy()
+
+
 def along(run, actions, direction, step):
     """Central difference of the weighted sum along a direction of the actions, by the environment's own steps."""
     rows, env = run.period.periods.rows, run.period.env
@@ -53,11 +60,10 @@ def test_gradient_is_that_of_differences(name, mode, rate):
     """
     env = made(name, action_mode=mode, control_rate=rate)
     run, actions = WholeEpisode(env, SEEN), some_actions(env, int(0.4 * rate))
-    given = torch.tensor(actions, requires_grad=True)
-    weighted(run, given).backward()
+    gradient = gradient_of(run, actions)
     for seed in (1, 2):
         direction = np.random.default_rng(seed).normal(size=actions.shape)
-        found = float((given.grad.numpy() * direction).sum())
+        found = float((gradient * direction).sum())
         assert found == pytest.approx(along(run, actions, direction, 1e-6), rel=1e-4)
 
 
@@ -75,10 +81,8 @@ def test_gradient_in_other_settings_is_that_of_differences(settings):
     """Other equations, and periods that are far shorter and far longer than the patient's."""
     env = made(action_mode="assist_moment", **settings)
     run, actions = WholeEpisode(env, SEEN), some_actions(env, min(max(int(0.3 / env.period), 2), 50))
-    given = torch.tensor(actions, requires_grad=True)
-    weighted(run, given).backward()
     direction = np.random.default_rng(1).normal(size=actions.shape)
-    found = float((given.grad.numpy() * direction).sum())
+    found = float((gradient_of(run, actions) * direction).sum())
     # As above; behind 0.3 s no muscle has turned round between the ends of a difference.
     assert found == pytest.approx(along(run, actions, direction, 1e-6), rel=1e-5)
 
@@ -87,10 +91,8 @@ def test_gradient_with_free_steps_is_that_of_differences():
     """To the error of the solver, which differences see as noise: 1e-6 over a step of 1e-2."""
     env = made(solver={"rtol": 1e-6}, action_mode="assist_moment")
     run, actions = WholeEpisode(env, SEEN), some_actions(env, 15)
-    given = torch.tensor(actions, requires_grad=True)
-    weighted(run, given).backward()
     direction = np.random.default_rng(1).normal(size=actions.shape)
-    found = float((given.grad.numpy() * direction).sum())
+    found = float((gradient_of(run, actions) * direction).sum())
     assert found == pytest.approx(along(run, actions, direction, 1e-2), rel=3e-3)
 
 
